@@ -1,0 +1,30 @@
+#pragma once
+
+#include <chrono>
+#include <compare>
+#include <cstdint>
+
+namespace tbm {
+
+// An instant as integer nanoseconds since 1970-01-01T00:00:00Z. The name of a variable says which
+// event: sensed_at, received_at, published_at. Recordings and DDS carry the same integer, so no
+// rounding ever happens between a camera and a CSV file.
+struct Timestamp {
+  std::int64_t ns = 0;
+
+  auto operator<=>(const Timestamp&) const = default;
+};
+
+using Duration = std::chrono::nanoseconds;
+
+inline Duration operator-(Timestamp later, Timestamp earlier) {
+  return Duration(later.ns - earlier.ns);
+}
+inline Timestamp operator+(Timestamp start, Duration span) { return {start.ns + span.count()}; }
+inline Timestamp operator-(Timestamp start, Duration span) { return {start.ns - span.count()}; }
+
+inline double SecondsBetween(Timestamp earlier, Timestamp later) {
+  return static_cast<double>(later.ns - earlier.ns) * 1e-9;
+}
+
+}  // namespace tbm

@@ -1,0 +1,43 @@
+# The few rules by which every target of the house is built.
+
+add_library(tbm_options INTERFACE)
+target_include_directories(tbm_options INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_options(tbm_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror)
+# GCC 12 sees overlapping copies inside std::string where there are none (GCC bug 105651).
+target_compile_options(tbm_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)
+# Fused multiply-add changes the last bit from machine to machine; a recording must replay bit for bit.
+target_compile_options(tbm_options INTERFACE -ffp-contract=off)
+if(TBM_SANITIZE)
+  target_compile_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE} -fno-omit-frame-pointer -g)
+  target_link_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE})
+endif()
+
+# tbm_library(pose_geometry SOURCES a.cc DEPS Eigen3::Eigen)   makes the static library tbm_pose_geometry
+function(tbm_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  add_library(tbm_${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(tbm_${name} PUBLIC tbm_options ${ARG_DEPS})
+endfunction()
+
+# tbm_program(camera_box SOURCES main.cc DEPS ...)   makes the executable of that name in <build>/bin
+function(tbm_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE tbm_options ${ARG_DEPS})
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+endfunction()
+
+# tbm_test(pose/geometry/tilt LABELS fast DEPS tbm_pose_geometry [TIMEOUT s] [SOURCES extra.cc])
+# builds tests/pose/geometry/tilt_test.cc. Labels: fast dds device slow root.
+function(tbm_test path)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "LABELS;DEPS;SOURCES" ${ARGN})
+  string(REPLACE "/" "_" target "${path}_test")
+  add_executable(${target} ${PROJECT_SOURCE_DIR}/tests/${path}_test.cc ${ARG_SOURCES})
+  target_link_libraries(${target} PRIVATE tbm_options ${ARG_DEPS} GTest::gmock GTest::gtest_main)
+  add_test(NAME ${path} COMMAND ${target})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  set_tests_properties(${path} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
+endfunction()
