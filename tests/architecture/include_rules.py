@@ -1,0 +1,102 @@
+"""Fails when a source file includes a layer that its folder may not know.
+
+The compiler cannot do this: the distribution puts every library under /usr/include, so an include of
+Fast DDS inside pose/ would compile unnoticed.
+
+  include_rules.py ROOT              check the tree
+  include_rules.py ROOT --self-test  check that planted violations are found
+"""
+import pathlib
+import re
+import sys
+import tempfile
+
+POSIX = {"fcntl.h", "poll.h", "termios.h", "unistd.h", "sys", "pty.h", "arpa", "netinet", "net", "ifaddrs.h"}
+POSE = {"pose/base", "pose/geometry", "pose/rig/rig.h"}
+POSE_ALL = {"pose/base", "pose/geometry", "pose/rig", "pose/centres", "pose/solve", "pose/frame"}
+
+# folder -> what its files may include besides the C++ standard library and their own folder
+ALLOWED = {
+    "pose/base": set(),
+    "pose/geometry": {"Eigen", "pose/base"},
+    "pose/centres": {"Eigen", *POSE, "pose/solve"},
+    "pose/solve": {"Eigen", *POSE, "ceres"},
+    "pose/rig": {"Eigen", "pose/base", "pose/geometry", "yaml-cpp", "fmt"},
+    "pose/frame": {"Eigen", *POSE, "pose/centres", "pose/solve"},
+    "pose/app": {"Eigen", *POSE_ALL, "devices", "idl/cpp", "fmt", "CLI", "yaml-cpp", *POSIX},
+    "devices/bus": {"pose/base", *POSIX, "boost"},
+    "devices/camera": {"Eigen", *POSE, "pose/centres", "devices/bus", "devices/sim", "devices/replay", "arv.h", "fmt", *POSIX},
+    "devices/inclinometer": {"pose/base", "pose/geometry", "devices/bus", "devices/sim", "modbus", "boost", "fmt", *POSIX},
+    "devices/replay": {"Eigen", *POSE_ALL, "png.h", "tiffio.h", "fmt", *POSIX},
+    "devices/sim": {"Eigen", *POSE, "pose/centres/image_view.h"},
+    "devices/app": {"Eigen", *POSE_ALL, "devices", "fmt", "CLI", "yaml-cpp", *POSIX, "arv.h"},
+    "guidance/app": {"Eigen", *POSE_ALL, "devices", "idl/cpp", "fmt", "CLI", "nlohmann", *POSIX},
+    "guidance/config": {"pose/base", "yaml-cpp", "fmt"},
+    "idl/cpp": {"Eigen", *POSE_ALL, "fastdds", "fastrtps", "fastcdr", "fmt", *POSIX},
+}
+# Folders that compute and do nothing else, and the standard headers that would betray them.
+PURE = {"pose/base", "pose/geometry", "pose/centres", "pose/solve", "pose/frame"}
+EFFECTS = {"condition_variable", "filesystem", "fstream", "future", "iostream", "mutex", "thread", "ctime", "random"}
+# One file alone may know a library that its folder may not.
+ONLY_IN = {"ceres": {"pose/solve/penalty_pose.cc"},
+           "arv.h": {"devices/camera", "devices/app"},
+           "yaml-cpp": {"pose/rig", "pose/app", "guidance/config", "devices/app"}}
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
+
+
+def under(name, folder):
+    return name == folder or name.startswith(folder + "/")
+
+
+def violations(root):
+    for file in sorted(p for p in root.rglob("*") if p.suffix in {".h", ".cc"}):
+        path = file.relative_to(root).as_posix()
+        top = path.split("/")[0]
+        if top not in {"pose", "guidance", "devices", "idl", "hmi_bridge"}:
+            continue
+        owners = [folder for folder in ALLOWED if under(path, folder)]
+        if not owners:
+            yield f"{path}: its folder has no include rule; add one to {pathlib.Path(__file__).name}"
+            continue
+        owner = max(owners, key=len)
+        for name in INCLUDE.findall(file.read_text()):
+            allowed = ALLOWED[owner] | {owner}
+            is_standard = "/" not in name and "." not in name
+            if is_standard:
+                is_fine = owner not in PURE or name not in EFFECTS
+            else:
+                is_fine = any(under(name, folder) for folder in allowed)
+            for library, places in ONLY_IN.items():
+                if under(name, library) and not any(under(path, place) for place in places):
+                    is_fine = False
+            if not is_fine:
+                yield f"{path}: {owner} must not know <{name}>"
+
+
+def self_test():
+    planted = {
+        "pose/solve/a.cc": "#include <fastdds/dds/core/policy/QosPolicies.hpp>\n",
+        "pose/solve/b.cc": "#include <ceres/ceres.h>\n",
+        "pose/frame/c.cc": "#include <thread>\n",
+        "devices/camera/d.h": '#include "devices/inclinometer/inclinometer.h"\n',
+        "pose/nowhere/e.h": "#pragma once\n",
+        "idl/cpp/f.cc": "#include <yaml-cpp/yaml.h>\n",
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        for name, text in planted.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text(text)
+        found = list(violations(root))
+        missed = [name for name in planted if not any(line.startswith(name + ":") for line in found)]
+        (root / "pose/solve/penalty_pose.cc").write_text("#include <ceres/ceres.h>\n")
+        if any("penalty_pose" in line for line in violations(root)):
+            missed.append("penalty_pose.cc refused although it may know ceres")
+        return [f"not found: {name}" for name in missed]
+
+
+if __name__ == "__main__":
+    problems = self_test() if "--self-test" in sys.argv else list(violations(pathlib.Path(sys.argv[1])))
+    print("\n".join(problems))
+    sys.exit(1 if problems else 0)
