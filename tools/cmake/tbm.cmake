@@ -13,6 +13,9 @@ if(TBM_SANITIZE)
   target_link_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE})
 endif()
 
+# Tests that also run under the sanitizers carry the label asan or tsan and are built by one target.
+add_custom_target(sanitized_tests)
+
 # tbm_library(pose_geometry SOURCES a.cc DEPS Eigen3::Eigen)   makes the static library tbm_pose_geometry
 function(tbm_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
@@ -29,7 +32,8 @@ function(tbm_program name)
 endfunction()
 
 # tbm_test(pose/geometry/tilt LABELS fast DEPS tbm_pose_geometry [TIMEOUT s] [SOURCES extra.cc])
-# builds tests/pose/geometry/tilt_test.cc. Labels: fast dds device slow root.
+# builds tests/pose/geometry/tilt_test.cc. Labels: fast dds device slow root; serial (not beside
+# others); asan, tsan (also in that sanitizer's tree). Tests labelled fast run under asan as well.
 function(tbm_test path)
   cmake_parse_arguments(ARG "" "TIMEOUT" "LABELS;DEPS;SOURCES" ${ARGN})
   string(REPLACE "/" "_" target "${path}_test")
@@ -39,5 +43,33 @@ function(tbm_test path)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
+  if("fast" IN_LIST ARG_LABELS)
+    list(APPEND ARG_LABELS asan)
+  endif()
+  if(("asan" IN_LIST ARG_LABELS AND TBM_SANITIZE MATCHES "address") OR
+     ("tsan" IN_LIST ARG_LABELS AND TBM_SANITIZE MATCHES "thread"))
+    add_dependencies(sanitized_tests ${target})
+  endif()
   set_tests_properties(${path} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
+endfunction()
+
+option(TBM_FUZZ "build the fuzz targets (clang with libFuzzer)" OFF)
+add_custom_target(fuzz_targets)
+if(TBM_FUZZ)
+  target_compile_options(tbm_options INTERFACE
+    -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined -g)
+  target_link_options(tbm_options INTERFACE -fsanitize=address,undefined)
+endif()
+
+# tbm_fuzz(csv DEPS tbm_devices_replay)   builds tests/fuzz/csv_fuzz.cc in the fuzz tree; nothing elsewhere.
+function(tbm_fuzz name)
+  if(NOT TBM_FUZZ)
+    return()
+  endif()
+  cmake_parse_arguments(ARG "" "" "DEPS" ${ARGN})
+  add_executable(${name}_fuzz ${PROJECT_SOURCE_DIR}/tests/fuzz/${name}_fuzz.cc)
+  target_link_libraries(${name}_fuzz PRIVATE tbm_options ${ARG_DEPS})
+  target_link_options(${name}_fuzz PRIVATE -fsanitize=fuzzer,address,undefined)
+  set_target_properties(${name}_fuzz PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+  add_dependencies(fuzz_targets ${name}_fuzz)
 endfunction()
