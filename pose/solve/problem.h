@@ -44,6 +44,7 @@ enum class PoseFailure {
   kNotObservable,  // predicted covariance beyond the limits of SolveOptions
   kBehindCamera,
   kNotConverged,
+  kAmbiguous,  // several poses explain the sightings equally well and no start decides
 };
 
 struct SolveOptions {
