@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-
 #include "pose/solve/normal_equations.h"
+#include "pose/solve/observable.h"
 #include "pose/solve/start_pose.h"
 #include "pose/solve/vision_start.h"
 
@@ -26,19 +24,6 @@ constexpr double kStaleMove = 2e-3;
 constexpr int kMaxWeighings = 4;
 constexpr double kFirstDamping = 1e-4;
 constexpr double kMostDamping = 1e8;
-
-bool ExceedsSigma(const Eigen::Matrix3d& covariance, double max_sigma) {
-  const double limit = max_sigma * max_sigma;
-  if (covariance.trace() <= limit) return false;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance, Eigen::EigenvaluesOnly);
-  return !(axes.eigenvalues().maxCoeff() <= limit);
-}
-
-bool IsObservable(const PoseCovariance& covariance, const SolveOptions& options) {
-  return covariance.allFinite() &&
-         !ExceedsSigma(covariance.topLeftCorner<3, 3>(), options.max_sigma_rotation_rad) &&
-         !ExceedsSigma(covariance.bottomRightCorner<3, 3>(), options.max_sigma_translation_m);
-}
 
 // Levenberg-Marquardt over six unknowns. Everything it needs lies inside the object.
 class Refinement {

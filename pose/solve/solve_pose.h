@@ -19,7 +19,8 @@ PoseResult SolveVision(const PoseProblem& problem,
                        const std::optional<Rigid3>& start = std::nullopt,
                        const SolveOptions& options = {});
 
-// Calls the one that `method` names (`published` is PenaltyPose of penalty_pose.h).
+// Calls the one that `method` names (`published` is PenaltyPose of penalty_pose.h). Lives in the
+// library tbm_pose_penalty, with Ceres; the two above need std and Eigen only.
 PoseResult SolvePose(PoseMethod method,
                      const PoseProblem& problem,
                      const std::optional<Rigid3>& start = std::nullopt,
