@@ -1,0 +1,51 @@
+#pragma once
+
+#include "pose/centres/assign_fit.h"
+
+namespace tbm::assign {
+
+struct Candidate {
+  Matches matches;
+  Fit fit;
+};
+
+// The best explanations met so far: more LEDs first, then smaller chi2. Room for kRoom; what is
+// worse than all of a full list is not kept.
+class Candidates {
+ public:
+  void Offer(const Candidate& candidate);
+  // Whether some candidate already holds all of these matches.
+  bool Covers(const Matches& matches) const;
+  std::size_t size() const { return list_.size(); }
+  const Candidate& operator[](std::size_t i) const { return list_[i]; }
+  const Candidate* begin() const { return list_.begin(); }
+  const Candidate* end() const { return list_.end(); }
+
+ private:
+  static constexpr std::size_t kRoom = 48;
+  FixedVector<Candidate, kRoom> list_;
+};
+
+// Bounds of the work. Beyond them the faintest spots, then the last LED pairs, are not tried as
+// seeds; they still may join a seed that others made.
+inline constexpr int kSeedSpotsWithTilts = 32;
+inline constexpr int kSeedLedPairs = 40;
+inline constexpr int kSeedSpotsWithoutTilts = 10;
+inline constexpr int kSeedLedTriples = 20;
+inline constexpr int kMaxRefinedSeeds = 4000;
+
+// Every pair of LEDs on every pair of spots gives at most two poses through the up vectors;
+// wherever one of them explains a third spot, the three are fitted and extended. Returns whether
+// any pair of spots could be a pair of LEDs at all. Needs scene.ups.
+bool SearchByTilts(const Scene& scene, Candidates& found);
+
+// Every triple of LEDs on every triple of spots gives at most four poses; wherever one of them
+// explains a fourth spot, the four are fitted and extended. Returns whether any triple of spots
+// could be a triple of LEDs at all. For scenes without ups.
+bool SearchByVision(const Scene& scene, Candidates& found);
+
+// Pairs of spots inside the gates that the prior (with the tilts, when there are any) leaves.
+// Candidates have two LEDs or more. Needs scene.prior.
+void SearchByPrior(const Scene& scene, Candidates& found);
+
+}  // namespace tbm::assign
