@@ -1,0 +1,46 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "devices/app/gige_simulator.h"
+#include "devices/sim/camera_view.h"
+#include "devices/sim/world.h"
+#include "pose/base/result.h"
+
+namespace tbm {
+
+// What every simulator program offers on its command line: camera, rig, motion, faults.
+struct MachineOptions {
+  GigeSimulatorOptions camera;
+  std::string rig_file;
+  std::string truth_file;
+  double run_for_s = 0.0;  // 0: until a signal comes
+  double speed = 1.0;
+  sim::Motion motion;
+  sim::ViewOptions view;
+  double advance_mm_per_min = 60.0;
+  double vibration_mm = 0.05;
+  std::vector<std::string> hidden_leds;
+  std::vector<std::string> lamps;
+  std::vector<std::string> reflections;
+  std::vector<std::string> tilt_faults;
+};
+
+void AddMachineOptions(CLI::App& app, MachineOptions& options);
+
+// The world that the options describe, beginning now. All faults of the command line and of the rig
+// file at once, one a line.
+Result<std::shared_ptr<const sim::World>, std::string> BuildWorld(const MachineOptions& options);
+
+// SIGINT and SIGTERM wait for WaitForEnd from here on; call it before any thread is made.
+void HoldSignals();
+
+// Returns when a signal has come or `run_for_s` (if not 0) is over.
+void WaitForEnd(double run_for_s);
+
+}  // namespace tbm

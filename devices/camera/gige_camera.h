@@ -1,0 +1,72 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+
+#include "devices/camera/camera.h"
+#include "devices/camera/camera_clock.h"
+#include "devices/camera/camera_life.h"
+#include "devices/camera/frame_id.h"
+#include "devices/camera/health_board.h"
+
+namespace tbm {
+
+// A GigE Vision camera through Aravis 0.8.
+//
+// How long WaitFrame may block beyond its timeout: 0.2 s per attempt while the address does not
+// answer, 3 s when another program controls the camera (five register tries of 0.5 s), and closing
+// a connection whose camera died up to 6 s. So stopping the process takes that long at worst.
+//
+// Images are lent from kBuffers buffers allocated when the stream opens. Per frame Aravis itself
+// allocates, in its own receive thread, one record of the frame and one of its packets (tens of
+// bytes a packet); the thread that calls WaitFrame allocates nothing.
+//
+// The first frame after opening is often incomplete: the socket buffer grows only once the stream
+// runs. It is handed out, flagged, and not counted as incomplete.
+class GigeCamera final : public Camera {
+ public:
+  static constexpr int kBuffers = 8;
+
+  GigeCamera(const CameraConfig& config, const Clock& clock);
+  ~GigeCamera() override;
+  GigeCamera(const GigeCamera&) = delete;
+  GigeCamera& operator=(const GigeCamera&) = delete;
+
+  Result<Frame, CameraFailure> WaitFrame(Duration timeout) override;
+  void RequestExposure(double exposure_us) override;
+  CameraHealth Health() const override { return board_.Read(); }
+  void Close() override;
+
+ private:
+  struct Connection;  // everything of Aravis
+
+  std::optional<CameraFailure> Open();
+  std::optional<CameraFailure> OpenWhenDue(Duration timeout);
+  std::optional<Frame> NextFrame(Duration timeout);
+  std::optional<Frame> Deliver(void* buffer);
+  void FillImage(void* buffer, Frame& frame) const;
+  void FillTimes(void* buffer, Frame& frame);
+  void CountFrame(const Frame& frame, const FrameIdCounter::Step& step, bool is_first);
+  void ApplyExposure();
+  CameraFailure Drop(CameraFailure why, const std::string& detail);
+  void ReportSocketBuffer();
+
+  CameraConfig config_;
+  const Clock& clock_;
+  CameraLife life_;
+  HealthBoard board_;
+  FrameIdCounter ids_;
+  CameraClock camera_clock_;
+  std::unique_ptr<Connection> connection_;
+  bool was_open_ = false;
+  CameraFailure last_failure_ = CameraFailure::kUnreachable;
+
+  std::atomic<double> requested_us_;  // NaN when there is nothing new
+  double wanted_us_;                  // last request, clamped; survives a reconnect
+  double exposure_us_;                // of the frames that arrive now
+  std::optional<double> coming_us_;   // written to the camera at coming_from_
+  Timestamp coming_from_;
+};
+
+}  // namespace tbm
