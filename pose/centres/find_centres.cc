@@ -1,0 +1,364 @@
+#include "pose/centres/find_centres.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "pose/base/check.h"
+#include "pose/centres/image_levels.h"
+#include "pose/centres/label_runs.h"
+#include "pose/centres/measure_spot.h"
+#include "pose/centres/row_max.h"
+#include "pose/centres/split_blobs.h"
+
+namespace tbm {
+namespace {
+
+constexpr int kBlockHeight = 8;
+constexpr int kThresholdWidth = 16;  // columns that share one threshold
+constexpr std::size_t kMaxRuns = 32768;
+constexpr std::size_t kMaxNeighbours = 8;
+
+// What rises less than this above its surroundings is no lamp: pipes, wet walls.
+constexpr double kLowestOffset = 1.0 / 40.0;  // of full scale
+// Assumed until the spots themselves tell: a small sensor's well, so that sigmas err to the large.
+constexpr double kAssumedWellElectrons = 10000.0;
+constexpr double kLargestWellElectrons = 100000.0;
+// Shape misfit, as a share of the spot's light, beyond which it is no spot.
+constexpr double kLargestMisfit = 0.3;
+
+struct Candidate {
+  SpotGuess guess;
+  SpotFit fit;
+  bool measured = false;
+};
+
+bool Near(const SpotFit& a, const SpotFit& b) {
+  const double reach =
+      5.0 * (std::max(a.sigma_u_px, a.sigma_v_px)) + 4.0 * std::max(b.sigma_u_px, b.sigma_v_px);
+  return std::abs(a.u_px - b.u_px) < reach && std::abs(a.v_px - b.v_px) < reach;
+}
+
+// Difference of the two axes' second moments and twice the mixed moment: what has a direction.
+struct Stretch {
+  double along_px2 = 0.0;
+  double across_px2 = 0.0;
+};
+Stretch StretchOf(const SpotFit& fit) {
+  return {fit.moment_uu_px2 - fit.moment_vv_px2, 2.0 * fit.moment_uv_px2};
+}
+
+}  // namespace
+
+struct CentreFinder::WorkSpace {
+  explicit WorkSpace(const FinderOptions& options)
+      : labeller(kMaxRuns),
+        splitter(kMaxRuns),
+        meter(options.min_spread_px, options.max_spread_px) {
+    candidates.reserve(splitter.guesses().capacity());
+    order.reserve(candidates.capacity());
+    sorted.reserve(candidates.capacity());
+  }
+
+  LevelMap levels;
+  RunLabeller labeller;
+  BlobSplitter splitter;
+  SpotMeter meter;
+  std::vector<Candidate> candidates;
+  std::vector<std::size_t> order;
+  std::vector<double> sorted;
+  FoundCentres found;
+  double offset_dn = 0.0;  // of the threshold above the level
+  double gain = 0.0;
+
+  template <class Pixel>
+  void ScanImage(const ImageView& image);
+  template <class Pixel>
+  void ScanBlock(const ImageView& image, int column, int row, int columns, int rows);
+  std::size_t CollectGuesses(const ImageView& image, const FinderOptions& options);
+  void MeasureAll(const ImageView& image, const FinderOptions& options);
+  void MeasureNeighbours(const ImageView& image, const SensorNoise& noise);
+  void DropDoubles();
+  double MedianOfSorted();
+  void EstimateGain(const FinderOptions& options, double full_dn);
+  Stretch CommonStretch();
+  void Report(const FinderOptions& options);
+};
+
+CentreFinder::CentreFinder(const FinderOptions& options)
+    : options_(options), work_(std::make_unique<WorkSpace>(options)) {}
+CentreFinder::~CentreFinder() = default;
+CentreFinder::CentreFinder(CentreFinder&&) noexcept = default;
+CentreFinder& CentreFinder::operator=(CentreFinder&&) noexcept = default;
+
+Result<const FoundCentres*, ImageFailure> CentreFinder::Find(const ImageView& image) {
+  TBM_CHECK(image.bytes_per_pixel == 1 || image.bytes_per_pixel == 2);
+  TBM_CHECK(image.width_px >= 0 && image.height_px >= 0 && image.max_value > 0);
+  TBM_CHECK(image.stride_bytes >= std::ptrdiff_t{image.bytes_per_pixel} * image.width_px);
+  WorkSpace& work = *work_;
+  work.found.centres.clear();
+  work.found.levels = {};
+  if (image.width_px == 0 || image.height_px == 0) return Failure{ImageFailure::kDark};
+
+  work.levels.Measure(image);
+  work.found.levels.background_dn = static_cast<double>(work.levels.median_dn());
+  work.found.levels.noise_dn = static_cast<double>(work.levels.noise_dn());
+  if (static_cast<double>(work.levels.saturated_fraction()) > options_.saturated_fraction) {
+    return Failure{ImageFailure::kSaturated};
+  }
+  // A noisy image can have more runs than there is room for: then only what is brighter is looked
+  // at.
+  work.offset_dn = std::max(
+      {0.6 * options_.min_snr * work.found.levels.noise_dn, kLowestOffset * image.max_value, 1.0});
+  do {
+    work.labeller.Clear();
+    if (image.bytes_per_pixel == 1) {
+      work.ScanImage<std::uint8_t>(image);
+    } else {
+      work.ScanImage<std::uint16_t>(image);
+    }
+    if (!work.labeller.overflowed()) break;
+    work.offset_dn *= 2.0;
+  } while (work.offset_dn < image.max_value);
+  if (work.CollectGuesses(image, options_) == 0) return Failure{ImageFailure::kDark};
+  work.MeasureAll(image, options_);
+  work.Report(options_);
+  return &work.found;
+}
+
+// The one pass over the image: the brightest pixel of each block against the lowest threshold that
+// any pixel of it may have. Only blocks that exceed it are looked at again.
+template <class Pixel>
+void CentreFinder::WorkSpace::ScanImage(const ImageView& image) {
+  const auto* first = static_cast<const std::byte*>(image.pixels);
+  static_assert(LevelMap::kTileSize == kBlockWidth && LevelMap::kTileSize % kBlockHeight == 0);
+  std::array<int, 256> bright;  // of one strip of blocks; wider images go in several parts
+  for (int row = 0; row < image.height_px; row += kBlockHeight) {
+    const int rows = std::min(kBlockHeight, image.height_px - row);
+    for (int part = 0; part < image.width_px; part += kBlockWidth * 256) {
+      std::size_t count = 0;
+      const int part_end = std::min(image.width_px, part + kBlockWidth * 256);
+      for (int column = part; column < part_end; column += kBlockWidth) {
+        const int columns = std::min(kBlockWidth, image.width_px - column);
+        const std::byte* at = first + row * image.stride_bytes + column * int{sizeof(Pixel)};
+        const Pixel brightest = columns == kBlockWidth
+                                    ? BlockMax<Pixel>(at, image.stride_bytes, rows)
+                                    : BlockMaxPlain<Pixel>(at, image.stride_bytes, columns, rows);
+        const float lowest = levels.LowestAround(column / kBlockWidth, row / LevelMap::kTileSize);
+        if (brightest > lowest + static_cast<float>(offset_dn)) bright[count++] = column;
+      }
+      for (int y = row; y < row + rows && count > 0; ++y) {
+        for (std::size_t i = 0; i < count; ++i) {
+          const int columns = std::min(kBlockWidth, image.width_px - bright[i]);
+          ScanBlock<Pixel>(image, bright[i], y, columns, 1);
+        }
+      }
+    }
+  }
+}
+
+template <class Pixel>
+void CentreFinder::WorkSpace::ScanBlock(
+    const ImageView& image, int column, int row, int columns, int rows) {
+  (void)rows;
+  const auto* row_start = static_cast<const std::byte*>(image.pixels) + row * image.stride_bytes;
+  if (columns == kBlockWidth) {
+    const float lowest = levels.LowestAround(column / kBlockWidth, row / LevelMap::kTileSize);
+    const std::byte* at = row_start + column * int{sizeof(Pixel)};
+    if (BlockMax<Pixel>(at, image.stride_bytes, 1) <= lowest + static_cast<float>(offset_dn))
+      return;
+  }
+  for (int x = column; x < column + columns; x += kThresholdWidth) {
+    const int width = std::min(kThresholdWidth, column + columns - x);
+    const float level = levels.At(static_cast<float>(x) + 0.5f * static_cast<float>(width),
+                                  static_cast<float>(row));
+    const int threshold = static_cast<int>(level + static_cast<float>(offset_dn));
+    labeller.Scan<Pixel>(row_start, row, x, x + width, threshold, image.max_value);
+  }
+}
+
+// Returns how many blobs there were that are more than a hot pixel.
+std::size_t CentreFinder::WorkSpace::CollectGuesses(const ImageView& image,
+                                                    const FinderOptions& options) {
+  const double full_dn = image.max_value;
+  SplitOptions split;
+  split.max_spread_px = options.max_spread_px;
+  split.noise_dn = found.levels.noise_dn;
+  split.gain_dn_per_electron =
+      options.gain_dn_per_electron.value_or(full_dn / kAssumedWellElectrons);
+  std::size_t blobs = 0;
+  splitter.guesses().clear();
+  for (const Blob& blob : labeller.Finish()) {
+    const float level = levels.At(static_cast<float>(blob.u_px()), static_cast<float>(blob.v_px()));
+    RaisedBlob raised{blob, static_cast<double>(level), offset_dn};
+    raised.offset_dn = std::floor(raised.background_dn + offset_dn) + 0.5 - raised.background_dn;
+    raised.offset_dn = std::max(raised.offset_dn, 0.5);
+    const SpotGuess guess = GuessSpot(raised, image.max_value);
+    if (blob.pixels < 3 || guess.spread_px < 0.55 * options.min_spread_px) {
+      ++found.levels.rejected_spots;
+      continue;
+    }
+    ++blobs;
+    if (!splitter.Split(image, raised, split)) ++found.levels.dropped_spots;
+  }
+  return blobs;
+}
+
+void CentreFinder::WorkSpace::MeasureAll(const ImageView& image, const FinderOptions& options) {
+  const double full_dn = image.max_value;
+  const double assumed_gain =
+      options.gain_dn_per_electron.value_or(full_dn / kAssumedWellElectrons);
+  SensorNoise noise{assumed_gain, found.levels.noise_dn * found.levels.noise_dn};
+  if (options.read_noise_dn) {
+    const double read = *options.read_noise_dn;
+    noise.dark_variance_dn2 = std::max(noise.dark_variance_dn2, read * read + 1.0 / 12.0);
+  }
+  candidates.clear();
+  for (const SpotGuess& guess : splitter.guesses()) {
+    if (guess.spread_px > 1.5 * options.max_spread_px) {
+      ++found.levels.rejected_spots;
+      continue;
+    }
+    Candidate candidate;
+    candidate.guess = guess;
+    candidate.measured =
+        meter.Measure(image, guess, noise, {}, &candidate.fit) == SpotVerdict::kMeasured;
+    if (!candidate.measured) {
+      ++found.levels.rejected_spots;
+      continue;
+    }
+    candidates.push_back(candidate);
+  }
+  DropDoubles();
+  MeasureNeighbours(image, noise);
+  DropDoubles();
+  EstimateGain(options, full_dn);
+}
+
+// Two guesses can lead to one spot; the later one goes.
+void CentreFinder::WorkSpace::DropDoubles() {
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const SpotFit& a = candidates[i].fit;
+    std::erase_if(candidates, [&](const Candidate& other) {
+      const SpotFit& b = other.fit;
+      return &other > &candidates[i] && std::hypot(a.u_px - b.u_px, a.v_px - b.v_px) <
+                                            0.7 * std::min(a.sigma_u_px, b.sigma_u_px);
+    });
+  }
+}
+
+// Spots in each other's windows are measured again, each without the other's light.
+void CentreFinder::WorkSpace::MeasureNeighbours(const ImageView& image, const SensorNoise& noise) {
+  for (int round = 0; round < 3; ++round) {
+    for (Candidate& candidate : candidates) {
+      std::array<const SpotFit*, kMaxNeighbours> others;
+      std::size_t count = 0;
+      for (const Candidate& other : candidates) {
+        if (&other == &candidate || count == kMaxNeighbours || !Near(candidate.fit, other.fit)) {
+          continue;
+        }
+        others[count++] = &other.fit;
+      }
+      if (count == 0) continue;
+      SpotGuess start = candidate.guess;
+      start.u_px = candidate.fit.u_px;
+      start.v_px = candidate.fit.v_px;
+      start.amplitude_dn = candidate.fit.amplitude_dn;
+      start.spread_px = std::sqrt(candidate.fit.sigma_u_px * candidate.fit.sigma_v_px);
+      SpotFit fit;
+      const auto neighbours = std::span(others).first(count);
+      if (meter.Measure(image, start, noise, neighbours, &fit) == SpotVerdict::kMeasured) {
+        candidate.fit = fit;
+      }
+    }
+  }
+}
+
+double CentreFinder::WorkSpace::MedianOfSorted() {
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  return *middle;
+}
+
+// From the residuals of the spots: their variance grows with their light by the gain. A spot of
+// another shape asks for more than the rest and has no say.
+void CentreFinder::WorkSpace::EstimateGain(const FinderOptions& options, double full_dn) {
+  gain = options.gain_dn_per_electron.value_or(full_dn / kAssumedWellElectrons);
+  if (options.gain_dn_per_electron || candidates.empty()) return;
+  sorted.clear();
+  for (const Candidate& c : candidates) sorted.push_back(c.fit.gain_seen);
+  const double median = MedianOfSorted();
+  double weights = 0.0;
+  double sum = 0.0;
+  for (const Candidate& c : candidates) {
+    if (c.fit.gain_seen > median + 2.0 * c.fit.gain_seen_sigma) continue;
+    const double weight = 1.0 / (c.fit.gain_seen_sigma * c.fit.gain_seen_sigma);
+    weights += weight;
+    sum += weight * c.fit.gain_seen;
+  }
+  gain = std::max(sum / weights, full_dn / kLargestWellElectrons);
+}
+
+// Motion blur stretches every spot of an image alike.
+Stretch CentreFinder::WorkSpace::CommonStretch() {
+  if (candidates.size() < 3) return {};
+  Stretch common;
+  sorted.clear();
+  for (const Candidate& c : candidates) sorted.push_back(StretchOf(c.fit).along_px2);
+  common.along_px2 = MedianOfSorted();
+  sorted.clear();
+  for (const Candidate& c : candidates) sorted.push_back(StretchOf(c.fit).across_px2);
+  common.across_px2 = MedianOfSorted();
+  return common;
+}
+
+void CentreFinder::WorkSpace::Report(const FinderOptions& options) {
+  order.clear();
+  for (std::size_t i = 0; i < candidates.size(); ++i) order.push_back(i);
+  std::sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
+    return candidates[a].fit.amplitude_dn > candidates[b].fit.amplitude_dn;
+  });
+  const Stretch common = CommonStretch();
+  for (const std::size_t i : order) {
+    const SpotFit& fit = candidates[i].fit;
+    const double spread = fit.SpreadPx();
+    const double elongation = fit.Elongation();
+    // What the residuals show beyond noise, as a share of the spot's light.
+    const double excess = std::max(fit.gain_seen - gain - 2.5 * fit.gain_seen_sigma, 0.0);
+    const double misfit = std::sqrt(2.0 * excess / fit.amplitude_dn);
+    const bool good = spread >= options.min_spread_px && spread <= options.max_spread_px &&
+                      elongation <= options.max_elongation && misfit <= kLargestMisfit &&
+                      fit.amplitude_dn >= options.min_snr * std::sqrt(fit.background_variance_dn2);
+    if (!good) {
+      ++found.levels.rejected_spots;
+      continue;
+    }
+    if (found.centres.full()) {
+      ++found.levels.dropped_spots;
+      continue;
+    }
+    // Longer than round, and longer than the rest: two lamps in one, their distance unknown.
+    const Stretch own = StretchOf(fit);
+    const double beyond_round = std::hypot(own.along_px2, own.across_px2);
+    const double beyond_rest =
+        std::hypot(own.along_px2 - common.along_px2, own.across_px2 - common.across_px2);
+    const double beyond = std::min(beyond_round, beyond_rest);
+    const double double_variance = beyond > 0.3 * spread * spread ? beyond : 0.0;
+    const double noise_variance = 0.5 * (fit.by_dark_u_px2 + fit.by_dark_v_px2) +
+                                  0.5 * gain * (fit.by_gain_u_px2 + fit.by_gain_v_px2);
+    Centre centre;
+    centre.pixel_px = {fit.u_px, fit.v_px};
+    centre.sigma_px =
+        std::sqrt(noise_variance + misfit * misfit * spread * spread + double_variance);
+    centre.peak_dn = fit.amplitude_dn;
+    centre.background_dn = fit.background_dn;
+    centre.spread_px = spread;
+    centre.elongation = elongation;
+    centre.clipped_pixels = fit.clipped_pixels;
+    found.centres.push_back(centre);
+  }
+}
+
+}  // namespace tbm

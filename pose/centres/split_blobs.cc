@@ -1,0 +1,128 @@
+#include "pose/centres/split_blobs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace tbm {
+namespace {
+
+constexpr std::size_t kMaxGuesses = 512;
+constexpr std::size_t kMaxPieces = 256;
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+
+// Light above the offset of the Gaussian that was guessed, cut off at full scale.
+double ExpectedWeight(const SpotGuess& guess, double offset_dn, double ceiling_dn) {
+  const double a = std::max(guess.amplitude_dn, 1.001 * offset_dn);
+  const double top = std::min(a, ceiling_dn);
+  return kTwoPi * guess.spread_px * guess.spread_px *
+         (top * std::log(a / top) + top - offset_dn - offset_dn * std::log(a / offset_dn));
+}
+
+// One round, Gaussian-like spot: nothing to take apart.
+bool LooksLikeOneSpot(const RaisedBlob& raised,
+                      const SpotGuess& guess,
+                      const SplitOptions& options,
+                      std::uint32_t max_value) {
+  if (guess.spread_px > options.max_spread_px || raised.blob.Elongation() > 1.15) return false;
+  const double ceiling_dn = static_cast<double>(max_value) - raised.background_dn;
+  const double share = raised.blob.weight / ExpectedWeight(guess, raised.offset_dn, ceiling_dn);
+  return share > 0.75 && share < 1.33;
+}
+
+// The next higher cut, by one grey value at least; 0 when the top is reached. By octaves through
+// the skirt, then at shares of the peak: two equal spots of sigma s part at 0.87 of the peak when
+// they are 2.4 s apart.
+double NextOffset(const RaisedBlob& raised) {
+  const double amplitude_dn = raised.blob.peak_dn - raised.background_dn;
+  if (2.0 * raised.offset_dn < 0.25 * amplitude_dn) return 2.0 * raised.offset_dn;
+  for (const double share : {0.25, 0.5, 0.72, 0.87}) {
+    if (share * amplitude_dn > 1.05 * raised.offset_dn + 1.0) return share * amplitude_dn;
+  }
+  return 0.0;
+}
+
+}  // namespace
+
+SpotGuess GuessSpot(const RaisedBlob& raised, std::uint32_t max_value) {
+  const Blob& blob = raised.blob;
+  const double ceiling_dn = static_cast<double>(max_value) - raised.background_dn;
+  SpotGuess guess;
+  guess.u_px = blob.u_px();
+  guess.v_px = blob.v_px();
+  guess.background_dn = raised.background_dn;
+  guess.amplitude_dn = std::max(blob.peak_dn - raised.background_dn, 1.0);
+  const double log_height = std::max(std::log(guess.amplitude_dn / raised.offset_dn), 0.2);
+  guess.spread_px = std::sqrt(std::max(blob.pixels - blob.clipped, 1) / (kTwoPi * log_height));
+  if (blob.clipped > 0) {
+    const double area = kTwoPi * guess.spread_px * guess.spread_px;
+    guess.amplitude_dn = ceiling_dn * std::exp(std::min(blob.clipped / area, 4.0));
+  }
+  return guess;
+}
+
+BlobSplitter::BlobSplitter(std::size_t max_runs) : labeller_(max_runs) {
+  pieces_.reserve(kMaxPieces);
+  guesses_.reserve(kMaxGuesses);
+}
+
+bool BlobSplitter::Split(const ImageView& image,
+                         const RaisedBlob& raised,
+                         const SplitOptions& options) {
+  pieces_.clear();
+  pieces_.push_back({raised, raised, false});
+  while (!pieces_.empty()) {
+    Piece piece = pieces_.back();
+    pieces_.pop_back();
+    SpotGuess guess = GuessSpot(piece.raised, image.max_value);
+    if (!LooksLikeOneSpot(piece.raised, guess, options, image.max_value)) {
+      if (!piece.has_widest && guess.spread_px <= options.max_spread_px) {
+        piece.widest = piece.raised;
+        piece.has_widest = true;
+      }
+      const double offset_dn = NextOffset(piece.raised);
+      if (offset_dn > 0.0 && PushChildren(image, piece, offset_dn, options) > 0) continue;
+      if (piece.has_widest) guess = GuessSpot(piece.widest, image.max_value);
+    }
+    if (guesses_.size() == guesses_.capacity()) return false;
+    guesses_.push_back(guess);
+  }
+  return true;
+}
+
+std::size_t BlobSplitter::PushChildren(const ImageView& image,
+                                       const Piece& parent,
+                                       double offset_dn,
+                                       const SplitOptions& options) {
+  const Blob& box = parent.raised.blob;
+  const double background_dn = parent.raised.background_dn;
+  const int threshold_dn = static_cast<int>(background_dn + offset_dn);
+  const auto* first = static_cast<const std::byte*>(image.pixels);
+  labeller_.Clear();
+  for (int row = box.top; row <= box.bottom; ++row) {
+    const std::byte* row_start = first + row * image.stride_bytes;
+    if (image.bytes_per_pixel == 1) {
+      labeller_.Scan<std::uint8_t>(
+          row_start, row, box.left, box.right + 1, threshold_dn, image.max_value);
+    } else {
+      labeller_.Scan<std::uint16_t>(
+          row_start, row, box.left, box.right + 1, threshold_dn, image.max_value);
+    }
+  }
+  const double noise_dn = std::hypot(
+      options.noise_dn, std::sqrt(options.gain_dn_per_electron * std::max(offset_dn, 0.0)));
+  const std::size_t before = pieces_.size();
+  for (const Blob& blob : labeller_.Finish()) {
+    const bool rises = blob.peak_dn - threshold_dn > 4.0 * noise_dn || blob.clipped > 2;
+    if (blob.pixels < 3 || !rises || pieces_.size() == pieces_.capacity()) continue;
+    const RaisedBlob raised{blob, background_dn, threshold_dn + 0.5 - background_dn};
+    pieces_.push_back({raised, parent.widest, parent.has_widest});
+  }
+  const std::size_t pushed = pieces_.size() - before;
+  if (pushed > 1) {
+    for (std::size_t i = before; i < pieces_.size(); ++i) pieces_[i].has_widest = false;
+  }
+  return pushed;
+}
+
+}  // namespace tbm
