@@ -1,0 +1,74 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <unistd.h>
+
+#include "devices/inclinometer/bcd_frame_emulator.h"
+#include "devices/inclinometer/make_inclinometers.h"
+#include "devices/inclinometer/modbus_emulator.h"
+
+namespace tbm::test {
+
+// Angles that a test can move while an emulator reads them.
+class MovableTruth {
+ public:
+  explicit MovableTruth(Inclination angles) : angles_(angles) {}
+  void Set(Inclination angles) {
+    const std::lock_guard lock(mutex_);
+    angles_ = angles;
+  }
+  TiltTruth Function() {
+    return [this](Timestamp) {
+      const std::lock_guard lock(mutex_);
+      return angles_;
+    };
+  }
+
+ private:
+  std::mutex mutex_;
+  Inclination angles_;
+};
+
+// A folder of its own, gone with the test.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "tbm_tilt_XXXXXX").string();
+    path_ = mkdtemp(pattern.data());
+  }
+  ~ScratchFolder() { std::filesystem::remove_all(path_); }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  std::string File(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline ModbusRegisterMap ThousandthsOfADegree() {
+  ModbusRegisterMap map;
+  map.rad_per_lsb = DegToRad(0.001);
+  return map;
+}
+
+// Fast enough that a test is short, with the ratios of the real settings.
+inline InclinometerConfig QuickConfig(InclinometerDriver driver, const std::string& path) {
+  InclinometerConfig config;
+  config.name = "target";
+  config.driver = driver;
+  config.port.path = path;
+  config.port.baud = 115200;
+  config.address = driver == InclinometerDriver::kModbus ? 1 : 0;
+  config.registers = ThousandthsOfADegree();
+  config.poll_period = std::chrono::milliseconds(10);
+  config.silent_after = std::chrono::milliseconds(300);
+  return config;
+}
+
+}  // namespace tbm::test
