@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "idl/cpp/boundary.h"
+#include "idl/cpp/messages.h"
+#include "idl/cpp/participant.h"
+
+namespace tbm::dds {
+
+enum class WriteOutcome {
+  kWritten,    // handed to the sockets; how many readers there are is another question
+  kNoNetwork,  // the participant waits for an address; health and events go out when it has one
+  kRefused,    // breaks the contract: see refused_because
+  kFailed,     // DDS would not take it: more keys than the class has room for
+};
+
+struct PublisherCounters {
+  std::uint64_t written = 0;
+  std::uint64_t without_network = 0;
+  std::uint64_t refused = 0;
+  std::uint64_t failed = 0;
+  BoundaryFault refused_because = BoundaryFault::kNone;  // the last one
+};
+
+// Writes one topic. Message is FrameFeatures, TiltReading, RelativePose, DeviceHealth or Event;
+// topic and QoS follow from it. One thread at a time writes; the others wait.
+//
+// Write keeps no reference and does not wait for readers. No heap of our own after the first
+// sample; what Fast DDS does is measured in tests/idl/publisher_heap_test.cc.
+template <class Message>
+class Publisher {
+ public:
+  explicit Publisher(Participant& participant);
+  ~Publisher();
+  Publisher(const Publisher&) = delete;
+  Publisher& operator=(const Publisher&) = delete;
+
+  WriteOutcome Write(const Message& message);
+
+  int matched_readers() const;
+  PublisherCounters counters() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tbm::dds
