@@ -42,6 +42,7 @@ int main(int argc, char** argv) {
     return kDevice;
   }
   fmt::print("camera address={} serial={}\n", options.camera.address, options.camera.serial);
+  fmt::print("ready\n");
   std::fflush(stdout);
   tbm::WaitForEnd(options.run_for_s);
   fmt::print(

@@ -39,6 +39,7 @@ enum class FrameFault {
   kMissingPackets,  // parts of the image never came and hold an older image
   kFileMissing,     // replay: no such file; no pixels
   kFileUnreadable,  // replay: cut or damaged; no pixels
+  kFileSize,        // replay: not the size that the run's rig is for; no pixels
 };
 
 // One exposure. It borrows its pixels: they stay valid until the next call of WaitFrame or Close on
@@ -96,8 +97,8 @@ struct CameraConfig {
   int silent_after_ms = 0;  // 0: three frame periods, but 200 ms at least
 
   // replay: the folder of a recorded run.
-  std::string run_folder;
-  bool real_time = true;  // false: as fast as the caller asks
+  std::string run_folder;  // Frame::frame_number is the row of frames.csv, from 1
+  bool real_time = true;   // false: as fast as the caller asks
 };
 
 // A camera as one grabber thread uses it. WaitFrame opens, reconnects and closes by itself, so that

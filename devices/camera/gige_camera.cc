@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <thread>
 #include <utility>
@@ -323,13 +322,11 @@ std::optional<CameraFailure> GigeCamera::Open() {
 }
 
 void GigeCamera::ReportSocketBuffer() {
-  // The kernel silently grants less than asked for.
-  std::int64_t allowed_bytes = std::numeric_limits<std::int64_t>::max();
-  std::ifstream("/proc/sys/net/core/rmem_max") >> allowed_bytes;
   const std::int64_t wanted_bytes = config_.socket_buffer_bytes;
+  const std::int64_t granted_bytes = GrantedSocketBuffer(config_.socket_buffer_bytes);
   board_.Update([&](CameraHealth& health) {
-    health.socket_buffer_bytes = std::min(wanted_bytes, allowed_bytes);
-    health.socket_buffer_short = allowed_bytes < wanted_bytes;
+    health.socket_buffer_bytes = granted_bytes;
+    health.socket_buffer_short = granted_bytes < wanted_bytes;
   });
 }
 

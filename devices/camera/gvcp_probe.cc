@@ -79,4 +79,15 @@ std::string InterfaceTowards(const std::string& address) {
   return text.data();
 }
 
+int GrantedSocketBuffer(int wanted_bytes) {
+  const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+  if (fd < 0) return -1;
+  setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &wanted_bytes, sizeof(wanted_bytes));
+  int granted_bytes = -2;
+  socklen_t size = sizeof(granted_bytes);
+  getsockopt(fd, SOL_SOCKET, SO_RCVBUF, &granted_bytes, &size);
+  close(fd);
+  return granted_bytes / 2;  // the kernel doubles what it grants, for its own records
+}
+
 }  // namespace tbm

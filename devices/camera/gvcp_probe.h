@@ -14,4 +14,8 @@ bool AnswersDiscovery(const std::string& address, Duration timeout);
 // The address of this computer's interface that leads to `address`; empty when there is no route.
 std::string InterfaceTowards(const std::string& address);
 
+// How much of a receive buffer the system grants a socket that asks for `wanted_bytes`: it silently
+// stops at net.core.rmem_max. -1 when there is no socket to be had.
+int GrantedSocketBuffer(int wanted_bytes);
+
 }  // namespace tbm

@@ -1,4 +1,5 @@
 #include "devices/camera/gige_camera.h"
+#include "devices/camera/replay_camera.h"
 #include "devices/camera/sim_camera.h"
 #include "pose/base/check.h"
 
@@ -16,7 +17,7 @@ std::unique_ptr<Camera> MakeCamera(const CameraConfig& config,
     case CameraDriver::kReplay:
       break;
   }
-  TBM_CHECK(false);
+  TBM_CHECK(false && "a driver without a maker");
 }
 
 }  // namespace tbm
