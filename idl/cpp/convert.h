@@ -1,10 +1,10 @@
 #pragma once
 
-#include "device_health.h"
-#include "event.h"
-#include "frame_features.h"
-#include "inclination.h"
-#include "relative_pose.h"
+#include "tbm_idl/device_health.h"
+#include "tbm_idl/event.h"
+#include "tbm_idl/frame_features.h"
+#include "tbm_idl/inclination.h"
+#include "tbm_idl/relative_pose.h"
 
 #include "idl/cpp/boundary.h"
 #include "idl/cpp/messages.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "interface_hash.h"
+#include "tbm_idl/interface_hash.h"
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fmt/format.h>

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string_view>
 
-#include "relative_pose.h"
+#include "tbm_idl/relative_pose.h"
 
 #include "pose/base/pose_reason.h"
 

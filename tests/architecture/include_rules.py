@@ -32,7 +32,7 @@ ALLOWED = {
     "devices/app": {"Eigen", *POSE_ALL, "devices", "fmt", "CLI", "yaml-cpp", *POSIX, "arv.h"},
     "guidance/app": {"Eigen", *POSE_ALL, "devices", "idl/cpp", "fmt", "CLI", "nlohmann", *POSIX},
     "guidance/config": {"pose/base", "yaml-cpp", "fmt"},
-    "idl/cpp": {"Eigen", *POSE_ALL, "fastdds", "fastrtps", "fastcdr", "fmt", *POSIX},
+    "idl/cpp": {"Eigen", *POSE_ALL, "fastdds", "fastrtps", "fastcdr", "tbm_idl", "fmt", *POSIX},
 }
 # Folders that compute and do nothing else, and the standard headers that would betray them.
 PURE = {"pose/base", "pose/geometry", "pose/centres", "pose/solve", "pose/frame"}
@@ -82,6 +82,7 @@ def self_test():
         "devices/camera/d.h": '#include "devices/inclinometer/inclinometer.h"\n',
         "pose/nowhere/e.h": "#pragma once\n",
         "idl/cpp/f.cc": "#include <yaml-cpp/yaml.h>\n",
+        "pose/app/g.cc": '#include "tbm_idl/event.h"\n',
     }
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
