@@ -1,0 +1,32 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace tbm {
+
+// A result file that appears under its name only when whole, and never over an existing one unless
+// that is allowed. The name "-" stands for the standard output.
+class OutputFile {
+ public:
+  OutputFile(std::string path, bool may_replace)
+      : path_(std::move(path)), may_replace_(may_replace) {}
+
+  // Asked before long work: why the file could not be written in the end. Empty when it could.
+  std::optional<std::string> Obstacle() const;
+
+  // Writes beside the name and renames. Empty when done, else what went wrong.
+  std::optional<std::string> Write(std::string_view bytes) const;
+
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+  bool may_replace_;
+};
+
+// Makes a folder for several results. Empty when it is there afterwards.
+std::optional<std::string> MakeFolder(const std::string& path);
+
+}  // namespace tbm

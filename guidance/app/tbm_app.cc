@@ -1,0 +1,214 @@
+#include "guidance/app/tbm_app.h"
+
+#include <algorithm>
+#include <exception>
+#include <map>
+#include <optional>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "guidance/app/check_command.h"
+#include "guidance/app/completion.h"
+#include "guidance/app/solve_command.h"
+
+namespace tbm {
+namespace {
+
+constexpr const char* kAbout =
+    "Where the front shield of a tunnel boring machine stands, from camera pictures of its LED "
+    "target and\n"
+    "from inclinometers. Works on recorded runs and shows the live system.";
+
+constexpr const char* kExamples =
+    "Examples\n"
+    "  tbm solve tests/data/run_small --out poses.csv\n"
+    "      a pose for every picture of a recorded run, with its sigma and its bound\n"
+    "  tbm check poses.csv station.gsi --point shield_head --align rigid --report report\n"
+    "      how far these poses are from what the total station measured\n"
+    "  tbm watch\n"
+    "      the live values of a running camera box\n"
+    "\n"
+    "Exit codes: 0 done, 2 command line or file wrong, 3 device, 4 DDS, 70 mistake of the "
+    "program.\n"
+    "Each command explains itself: tbm solve --help\n"
+    "Completion for your shell: source <(tbm completion bash)";
+
+constexpr const char* kSolveHelp =
+    "RUN is a folder with rig.yaml (camera, LEDs, inclinometers), frames.csv (time and file of "
+    "each\n"
+    "picture) and tilt.csv (readings of both inclinometers). One row is written for each row of\n"
+    "frames.csv, whatever happened to the frame:\n"
+    "  status       ok, degraded (usable with its sigma, something is missing) or none\n"
+    "  reason       why it is not ok, such as frame_missing or too_few_leds\n"
+    "  qw .. tz_mm  how the target stands in the camera frame (x right, y down, z forward)\n"
+    "  sigma_*      one standard deviation\n"
+    "  POINT_*      the points named in rig.yaml; POINT_bound_mm: the error is larger than this "
+    "once in\n"
+    "               a thousand frames at the most, even when one LED or one tilt reading is wrong\n"
+    "\n"
+    "Methods\n"
+    "  fused      LEDs and inclinometers, each weighted by its own sigma (default, most accurate)\n"
+    "  published  the estimator of the pose paper, for comparison\n"
+    "  vision     LEDs only\n"
+    "\n"
+    "Examples\n"
+    "  tbm solve run_0412 --out poses.csv\n"
+    "  tbm solve run_0412 --out vision.csv --method vision --force\n"
+    "  tbm solve run_0412 --out - --format json | jq .";
+
+constexpr const char* kCentresHelp =
+    "One row is written for each bright spot: stamp_ns, led (empty when the spot is none of the "
+    "target's),\n"
+    "u_px, v_px (pixel 0, 0 is the centre of the first pixel), sigma_px and peak (grey values "
+    "above the\n"
+    "background).\n"
+    "\n"
+    "Example\n"
+    "  tbm centres run_0412 --out centres.csv";
+
+constexpr const char* kCheckHelp =
+    "POSES is a file of tbm solve. LOG holds what the total station measured of the same point: a "
+    "CSV with\n"
+    "the columns stamp_ns, point, x_mm, y_mm, z_mm, or a Leica GSI-8 / GSI-16 file (east, north, "
+    "height).\n"
+    "\n"
+    "Pairing: where both files have stamps, each survey row takes the pose at its time, "
+    "interpolated\n"
+    "between the neighbours, or the nearest, none further than --tolerance-ms. Where stamps are "
+    "missing the\n"
+    "rows pair in order. Poses with status none are left out and counted.\n"
+    "\n"
+    "--align rigid first turns and shifts the survey onto the poses (no scale), for a total "
+    "station that\n"
+    "does not measure in the camera frame, and says how many degrees of freedom that took. At "
+    "least four\n"
+    "placements are needed for the remaining differences to say anything.\n"
+    "\n"
+    "Example\n"
+    "  tbm check poses.csv station.gsi --point shield_head --align rigid --report report\n"
+    "      writes report/check.csv, check.json and check.png";
+
+// All options of all commands, filled in by the parser.
+struct Requests {
+  SolveRequest solve;
+  SolveRequest centres;
+  CheckRequest check;
+  std::string align = "none";
+  std::string format = "csv";
+  std::string method = "fused";
+  std::string shell;
+};
+
+const std::map<std::string, PoseMethod> kMethods = {{"fused", PoseMethod::kFused},
+                                                    {"published", PoseMethod::kPublished},
+                                                    {"vision", PoseMethod::kVision}};
+
+CLI::App* AddSolve(CLI::App& app, Requests& requests) {
+  CLI::App* solve = app.add_subcommand("solve", "Poses of a recorded run");
+  solve->footer(kSolveHelp);
+  solve->add_option("RUN", requests.solve.run, "folder of the run")->required();
+  solve->add_option("--out,-o", requests.solve.out, "file to write; - is the standard output")
+      ->required();
+  solve->add_option("--method,-m", requests.method, "estimator")
+      ->check(CLI::IsMember({"fused", "published", "vision"}))
+      ->capture_default_str();
+  solve->add_option("--format", requests.format, "form of the output")
+      ->check(CLI::IsMember({"csv", "json"}))
+      ->capture_default_str();
+  solve->add_flag("--force,-f", requests.solve.force, "replace an existing file");
+  solve
+      ->add_option(
+          "--threads", requests.solve.threads, "threads that decode pictures; 0: one per core")
+      ->check(CLI::Range(0, 256));
+  return solve;
+}
+
+CLI::App* AddCentres(CLI::App& app, Requests& requests) {
+  CLI::App* centres = app.add_subcommand("centres", "Bright spots of a recorded run");
+  centres->footer(kCentresHelp);
+  centres->add_option("RUN", requests.centres.run, "folder of the run")->required();
+  centres->add_option("--out,-o", requests.centres.out, "file to write; - is the standard output")
+      ->required();
+  centres->add_flag("--force,-f", requests.centres.force, "replace an existing file");
+  centres
+      ->add_option(
+          "--threads", requests.centres.threads, "threads that decode pictures; 0: one per core")
+      ->check(CLI::Range(0, 256));
+  return centres;
+}
+
+CLI::App* AddCheck(CLI::App& app, Requests& requests) {
+  CheckRequest& request = requests.check;
+  CLI::App* check = app.add_subcommand("check", "Poses against a total station");
+  check->footer(kCheckHelp);
+  check->add_option("POSES", request.poses, "file of tbm solve")->required();
+  check->add_option("LOG", request.log, "total station's file: CSV or Leica GSI")->required();
+  check->add_option("--point", request.point, "point of rig.yaml, such as shield_head")->required();
+  check->add_option("--log-point", request.log_point, "its name in LOG, when that is another");
+  check->add_option("--align", requests.align, "fit the two frames to each other first")
+      ->check(CLI::IsMember({"none", "rigid"}))
+      ->capture_default_str();
+  check
+      ->add_option(
+          "--tolerance-ms", request.tolerance_ms, "furthest pose that may stand for a survey row")
+      ->check(CLI::Range(0.0, 86'400'000.0))
+      ->capture_default_str();
+  check->add_option("--report", request.report, "folder for check.csv, check.json and check.png");
+  check->add_flag("--force,-f", request.force, "replace existing files");
+  return check;
+}
+
+CLI::App* AddCompletion(CLI::App& app, Requests& requests) {
+  CLI::App* completion = app.add_subcommand("completion", "Completion script for a shell");
+  completion->footer("Example, in ~/.bashrc:\n  source <(tbm completion bash)");
+  completion->add_option("SHELL", requests.shell, "bash or zsh")
+      ->required()
+      ->check(CLI::IsMember({"bash", "zsh"}));
+  return completion;
+}
+
+ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
+  Requests requests;
+  CLI::App app(kAbout, "tbm");
+  app.footer(kExamples);
+  app.set_version_flag("--version", "tbm " TBM_VERSION, "print the version");
+  app.require_subcommand(1);
+  app.get_formatter()->column_width(28);
+  const CLI::App* solve = AddSolve(app, requests);
+  const CLI::App* centres = AddCentres(app, requests);
+  const CLI::App* check = AddCheck(app, requests);
+  const CLI::App* completion = AddCompletion(app, requests);
+
+  std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
+  try {
+    app.parse(std::move(arguments));
+  } catch (const CLI::ParseError& error) {
+    const bool is_help = error.get_exit_code() == 0;
+    app.exit(error, console.out, console.err);
+    return is_help ? ExitCode::kDone : ExitCode::kBadInput;
+  }
+  requests.solve.method = kMethods.at(requests.method);
+  requests.solve.as_json = requests.format == "json";
+  requests.check.align_rigid = requests.align == "rigid";
+  if (solve->parsed()) return RunSolve(requests.solve, console);
+  if (centres->parsed()) return RunCentres(requests.centres, console);
+  if (check->parsed()) return RunCheck(requests.check, console);
+  if (completion->parsed()) {
+    console.out << (requests.shell == "bash" ? BashCompletion(app) : ZshCompletion(app));
+  }
+  return ExitCode::kDone;
+}
+
+}  // namespace
+
+ExitCode RunTbm(std::vector<std::string> arguments, const Console& console) {
+  try {
+    return Dispatch(std::move(arguments), console);
+  } catch (const std::exception& error) {
+    Complain(console, fmt::format("a mistake in this program: {}; please report it", error.what()));
+    return ExitCode::kInternal;
+  }
+}
+
+}  // namespace tbm
