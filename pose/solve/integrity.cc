@@ -1,13 +1,13 @@
 #include "pose/solve/integrity.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include "pose/solve/solve_pose.h"
+#include "pose/solve/start_pose.h"
 #include "pose/solve/tails.h"
 #include "pose/solve/whitened.h"
 
@@ -82,19 +82,6 @@ PoseProblem Without(const PoseProblem& problem, const Reading& reading) {
   return rest;
 }
 
-// A problem that one wrong reading has bent may lead from one start into a false minimum: the best
-// of all starts counts.
-PoseResult BestOfStarts(const PoseProblem& problem,
-                        const FixedVector<Rigid3, 3>& starts,
-                        const SolveOptions& options) {
-  PoseResult best = SolveWhatIsThere(problem, std::nullopt, options);
-  for (const Rigid3& start : starts) {
-    const PoseResult other = SolveWhatIsThere(problem, start, options);
-    if (other && (!best || other->chi2 < best->chi2)) best = other;
-  }
-  return best;
-}
-
 struct Exclusion {
   Reading reading;
   PoseResult pose = Failure{PoseFailure::kNotConverged};
@@ -102,16 +89,67 @@ struct Exclusion {
   // denied.
   double chi2 = kNever;
   int dof = 0;
+  bool twofold = false;  // a second pose, far from the first, fits about as well
 };
 using Exclusions = FixedVector<Exclusion, kMaxExclusions>;
 
+// Where a search may begin: six by pairs, and the caller's.
+using Starts = FixedVector<Rigid3, 9>;
+
+// Three LEDs and tilts can have a mirror image, turned about the vertical, that fits as well. The
+// two roots of each pair of LEDs lead to all there is.
+void AddPairStarts(const PoseProblem& rest, Starts& starts) {
+  if (rest.leds.size() != 3 || !HasTilts(rest)) return;
+  for (std::size_t left_out = 0; left_out < 3; ++left_out) {
+    PoseProblem pair = rest;
+    pair.leds.erase(left_out);
+    const auto roots = StartPose(pair);
+    if (!roots) continue;
+    for (const Rigid3& root : roots->camera_from_target) starts.push_back(root);
+  }
+}
+
+bool FarApart(const Rigid3& a, const Rigid3& b) {
+  constexpr double kOtherMinimumRad = 0.05;
+  return ErrorBetween(a, b).head<3>().norm() > kOtherMinimumRad;
+}
+
+// What one wrong reading has bent may lead from one start into a false minimum: the best of all
+// counts.
+void SolveFromAll(const PoseProblem& rest,
+                  const Starts& starts,
+                  const IntegrityOptions& options,
+                  const SolveOptions& solve_options,
+                  Exclusion& exclusion) {
+  exclusion.pose = SolveWhatIsThere(rest, std::nullopt, solve_options);
+  double rival_chi2 = kNever;
+  for (const Rigid3& start : starts) {
+    PoseResult other = SolveWhatIsThere(rest, start, solve_options);
+    if (!other) continue;
+    if (!exclusion.pose || other->chi2 < exclusion.pose->chi2) std::swap(other, exclusion.pose);
+    if (other && FarApart(other->camera_from_target, exclusion.pose->camera_from_target)) {
+      rival_chi2 = std::min(rival_chi2, other->chi2);
+    }
+  }
+  exclusion.twofold = exclusion.pose && rival_chi2 < exclusion.pose->chi2 + options.isolation_chi2;
+}
+
 Exclusion Exclude(const PoseProblem& problem,
                   const Reading& reading,
-                  const FixedVector<Rigid3, 3>& starts,
-                  const SolveOptions& options) {
+                  const Starts& given,
+                  const std::optional<PosePriorInfo>& prior,
+                  const IntegrityOptions& options,
+                  const SolveOptions& solve_options) {
   Exclusion exclusion;
   exclusion.reading = reading;
-  exclusion.pose = BestOfStarts(Without(problem, reading), starts, options);
+  const PoseProblem rest = Without(problem, reading);
+  if (prior) exclusion.pose = SolveWhatIsThere(rest, prior->camera_from_target, solve_options);
+  if (!exclusion.pose || !PassesGate(*exclusion.pose, options)) {
+    Starts starts = given;
+    if (prior) starts.push_back(prior->camera_from_target);
+    AddPairStarts(rest, starts);
+    SolveFromAll(rest, starts, options, solve_options, exclusion);
+  }
   if (exclusion.pose) {
     exclusion.chi2 = exclusion.pose->chi2;
     exclusion.dof = exclusion.pose->dof;
@@ -134,6 +172,7 @@ void ScoreByPrior(const PoseProblem& problem, const PosePriorInfo& prior, Exclus
     const auto solution = Solve(normal);
     exclusion.chi2 = solution ? solution->chi2 : 0.0;
     exclusion.dof = normal.rows;
+    exclusion.twofold = false;
   }
 }
 
@@ -151,7 +190,8 @@ Verdict Judge(Exclusions& exclusions, const IntegrityOptions& options) {
                          : ChiSquaredTail(best.chi2, best.dof) >= options.gate_false_alarm;
   if (!mends) return Verdict::kNoneMends;
   const double next_chi2 = exclusions.size() > 1 ? exclusions[1].chi2 : kNever;
-  if (next_chi2 < best.chi2 + options.isolation_chi2) return Verdict::kMoreThanOneMends;
+  if (best.twofold || next_chi2 < best.chi2 + options.isolation_chi2)
+    return Verdict::kMoreThanOneMends;
   return Verdict::kFound;
 }
 
@@ -192,114 +232,27 @@ CheckedPose Accept(const PoseProblem& problem,
 }
 
 Result<CheckedPose, PoseReason> LeaveOneOut(const PoseProblem& problem,
-                                            const FixedVector<Rigid3, 3>& starts,
+                                            const Starts& starts,
                                             const std::optional<PosePriorInfo>& prior,
                                             const IntegrityOptions& options,
                                             const SolveOptions& solve_options) {
   Exclusions exclusions;
   for (const Reading& reading : ReadingsOf(problem)) {
-    exclusions.push_back(Exclude(problem, reading, starts, solve_options));
+    exclusions.push_back(Exclude(problem, reading, starts, prior, options, solve_options));
   }
   Verdict verdict = Judge(exclusions, options);
   if (verdict == Verdict::kMoreThanOneMends && prior) {
     ScoreByPrior(problem, *prior, exclusions);
     verdict = Judge(exclusions, options);
+    // Few readings have more than one solution; the one that was judged is the one at the prior.
+    exclusions[0].pose = SolveWhatIsThere(
+        Without(problem, exclusions[0].reading), prior->camera_from_target, solve_options);
   }
   if (verdict == Verdict::kNoneMends) return Failure{PoseReason::kInconsistent};
   if (verdict == Verdict::kMoreThanOneMends) return Failure{PoseReason::kAmbiguous};
   const Exclusion& found = exclusions[0];
   if (!found.pose) return Failure{ReasonOf(found.pose.error())};
   return Accept(problem, *found.pose, found.reading, options);
-}
-
-// One explanation of the readings, seen from the published pose.
-struct Hypothesis {
-  PoseError e = PoseError::Zero();  // to its own solution
-  PoseCovariance covariance = PoseCovariance::Zero();
-};
-using Hypotheses = FixedVector<Hypothesis, kMaxExclusions + 1>;
-
-bool WithinLimits(const PoseCovariance& covariance, const IntegrityOptions& options) {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turn;
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shift;
-  turn.computeDirect(covariance.topLeftCorner<3, 3>(), Eigen::EigenvaluesOnly);
-  shift.computeDirect(covariance.bottomRightCorner<3, 3>(), Eigen::EigenvaluesOnly);
-  return std::sqrt(turn.eigenvalues()[2]) <= options.max_sigma_rotation_rad &&
-         std::sqrt(shift.eigenvalues()[2]) <= options.max_sigma_translation_m;
-}
-
-// Subset and prior weighted by one half each: never too optimistic, however the two are correlated
-// (they share the calibration's errors). Covariance intersection.
-std::optional<Hypothesis> WithPrior(const SubsetNormal& normal,
-                                    const Rigid3& published,
-                                    const PosePriorInfo& prior) {
-  const Eigen::LLT<PoseCovariance> root(prior.covariance);
-  if (root.info() != Eigen::Success) return std::nullopt;
-  const PoseCovariance prior_information = root.solve(PoseCovariance::Identity());
-  const PoseError to_prior = ErrorBetween(published, prior.camera_from_target);
-  SubsetNormal both = normal;
-  both.information = 0.5 * (normal.information + prior_information);
-  both.gradient = 0.5 * (normal.gradient + prior_information * to_prior);
-  const auto solution = Solve(both);
-  if (!solution) return std::nullopt;
-  return Hypothesis{solution->e, solution->covariance};
-}
-
-// All explanations with at most one wrong reading that the residuals allow. Empty when one of them
-// leaves the pose unlimited.
-std::optional<Hypotheses> PlausibleHypotheses(const PoseProblem& problem,
-                                              const Rigid3& published,
-                                              const std::optional<PosePriorInfo>& prior,
-                                              const IntegrityOptions& options) {
-  const auto whitened = WhitenedProblem::From(problem, published);
-  if (!whitened) return std::nullopt;
-  Hypotheses hypotheses;
-  const auto add = [&](int omitted) {
-    const SubsetNormal normal = whitened->Without(omitted);
-    const auto solution = Solve(normal);
-    if (solution && WithinLimits(solution->covariance, options)) {
-      const int dof = normal.rows - 6;
-      const bool plausible =
-          dof <= 0 || ChiSquaredTail(solution->chi2, dof) >= options.implausible_risk;
-      if (plausible) hypotheses.push_back({solution->e, solution->covariance});
-      return true;
-    }
-    if (!prior) return false;
-    const auto limited = WithPrior(normal, published, *prior);
-    if (limited) hypotheses.push_back(*limited);
-    return limited.has_value();
-  };
-  if (!add(kNothingOmitted)) return std::nullopt;
-  for (const Reading& reading : ReadingsOf(problem)) {
-    if (!add(reading.first_row(problem))) return std::nullopt;
-  }
-  return hypotheses;
-}
-
-Eigen::Matrix3d PointCovariance(const Rigid3& pose,
-                                const NamedPoint& point,
-                                const PoseCovariance& covariance) {
-  const Eigen::Matrix<double, 3, 6> by_error = PointByError(pose, point.p_point_in_target);
-  Eigen::Matrix3d of_point = by_error * covariance * by_error.transpose();
-  of_point.diagonal().array() += point.sigma_m * point.sigma_m;
-  return of_point;
-}
-
-double Bound(const NamedPoint& point,
-             const Rigid3& published,
-             const Hypotheses& hypotheses,
-             const IntegrityOptions& options) {
-  const Eigen::Vector3d p_published = published * point.p_point_in_target;
-  const double noise_risk = options.bound_risk - options.implausible_risk;
-  double bound_m = 0.0;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    const Rigid3 pose = Moved(published, hypothesis.e);
-    const double separation_m = (pose * point.p_point_in_target - p_published).norm();
-    const double radius_m =
-        ErrorRadius(PointCovariance(pose, point, hypothesis.covariance), noise_risk);
-    bound_m = std::max(bound_m, separation_m + radius_m);
-  }
-  return bound_m;
 }
 
 }  // namespace
@@ -318,28 +271,10 @@ Result<CheckedPose, PoseReason> CheckPose(const PoseProblem& problem,
   }
   // One wrong reading can also keep the whole from converging.
   if (!whole && TooLittle(whole.error())) return Failure{ReasonOf(whole.error())};
-  FixedVector<Rigid3, 3> starts;
+  Starts starts;
   if (start) starts.push_back(*start);
   if (whole) starts.push_back(whole->camera_from_target);
-  if (prior) starts.push_back(prior->camera_from_target);
   return LeaveOneOut(problem, starts, prior, options, solve_options);
-}
-
-PointResults CheckPoints(const PoseProblem& problem,
-                         const CheckedPose& checked,
-                         const std::optional<PosePriorInfo>& prior,
-                         const IntegrityOptions& options) {
-  const Rigid3& published = checked.pose.camera_from_target;
-  const auto hypotheses = PlausibleHypotheses(problem, published, prior, options);
-  PointResults results;
-  for (const NamedPoint& point : problem.rig->points) {
-    PointResult result;
-    result.p_in_camera = published * point.p_point_in_target;
-    result.sigma_m = std::sqrt(PointCovariance(published, point, checked.pose.covariance).trace());
-    if (hypotheses) result.bound_m = Bound(point, published, *hypotheses, options);
-    results.push_back(result);
-  }
-  return results;
 }
 
 }  // namespace tbm
