@@ -37,7 +37,7 @@ struct FrameResult {
   PoseStatus status = PoseStatus::kNone;
   PoseReason reason = PoseReason::kNone;
   ImageLevels levels;
-  Centres centres;                                   // brightest first; empty without an image
+  Centres centres;                                       // brightest first; empty without an image
   std::array<std::int8_t, kMaxCentres> led_of_centre{};  // rig LED index, -1: belongs to none
   FrameTilt target_tilt;
   FrameTilt camera_tilt;
@@ -61,8 +61,8 @@ struct FrameSolverOptions {
 };
 
 // From exposures and tilt readings to poses, one frame at a time: find, assign, solve, check. Holds
-// the work space and the last accepted pose; no allocation after the first frame. The same inputs in
-// the same order give the same bits. One object per thread.
+// the work space and the last accepted pose; no allocation after the first frame. The same inputs
+// in the same order give the same bits. One object per thread.
 class FrameSolver {
  public:
   // Eq. 18 needs Ceres, which the camera box does not carry; who wants PoseMethod::kPublished hands
@@ -81,8 +81,8 @@ class FrameSolver {
   // The result stays valid until the next call.
   const FrameResult& Solve(const FrameInput& frame);
 
-  // What later frames depend on, as text that survives a file without losing a bit: a recording that
-  // starts in the middle of the day writes it down, so that its replay gives the same bits.
+  // What later frames depend on, as text that survives a file without losing a bit: a recording
+  // that starts in the middle of the day writes it down, so that its replay gives the same bits.
   std::string SaveState() const;
   // False (and nothing changed) when `state` was not written by SaveState.
   bool RestoreState(const std::string& state);
@@ -97,11 +97,20 @@ class FrameSolver {
     Timestamp sensed_at;
     Rigid3 camera_from_target;
     PoseCovariance covariance = PoseCovariance::Zero();
-    Inclination target_tilt;  // NaN when there was none
+    Inclination target_tilt;  // of the latest pose that used the tilts
     Inclination camera_tilt;
   };
 
   void SolveInto(const FrameInput& frame, FrameResult& result);
+  Result<Assignment, AssignFailure> Assign(const FrameResult& result,
+                                           const std::optional<PosePrior>& prior) const;
+  void SolveAssigned(const Assignment& assignment,
+                     const std::optional<PosePrior>& prior,
+                     FrameResult& result);
+  Result<CheckedPose, PoseReason> PublishedInstead(const PoseProblem& problem,
+                                                   const CheckedPose& checked) const;
+  void NameTiltFault(FrameResult& result) const;
+  void Accept(const FrameResult& result);
   std::optional<PosePrior> PriorAt(Timestamp at) const;
   std::optional<TiltSensor> SuspectTilt(const FrameResult& result) const;
   FrameTilt TiltAt(const TiltHistory& history, const TiltMount& mount, Timestamp at) const;

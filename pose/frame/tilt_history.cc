@@ -13,8 +13,9 @@ bool IsFinite(const Inclination& inclination) {
 Duration Between(Timestamp a, Timestamp b) { return a < b ? b - a : a - b; }
 
 // Ratio s^2 / sigma^2 above which `pairs` differences are noisier than the rig says, at about 0.1 %
-// false alarms: the Wilson-Hilferty approximation of the chi-squared quantile, divided by its degrees
-// of freedom. Differences of neighbours share readings, so about two thirds of them are independent.
+// false alarms: the Wilson-Hilferty approximation of the chi-squared quantile, divided by its
+// degrees of freedom. Differences of neighbours share readings, so about two thirds of them are
+// independent.
 double SignificantVarianceRatio(int pairs) {
   const double dof = 2.0 * pairs * (2.0 / 3.0);
   const double t = 2.0 / (9.0 * dof);
@@ -62,8 +63,8 @@ Result<TiltObservation, PoseReason> TiltHistory::At(Timestamp at, const TiltMoun
     if (!IsFinite(before->inclination) || !IsFinite(after->inclination)) {
       return Failure{PoseReason::kTiltNotFinite};
     }
-    const double part = SecondsBetween(before->sensed_at, at) /
-                        SecondsBetween(before->sensed_at, after->sensed_at);
+    const double part =
+        SecondsBetween(before->sensed_at, at) / SecondsBetween(before->sensed_at, after->sensed_at);
     reading.beta_rad = before->inclination.beta_rad +
                        part * (after->inclination.beta_rad - before->inclination.beta_rad);
     reading.gamma_rad = before->inclination.gamma_rad +

@@ -139,8 +139,7 @@ TEST(TiltHistory, VibrationRaisesSigmaToWhatItIs) {
 TEST(TiltHistory, SteadyMotionDoesNotRaiseSigma) {
   TiltHistory history;
   for (int i = 0; i < 20; ++i) history.Add(AtMs(20 * i), {DegToRad(0.2) * 0.020 * i, 0.0});
-  EXPECT_DOUBLE_EQ(history.At(AtMs(380), MountWithSigma(0.005)).value().sigma_rad,
-                   DegToRad(0.005));
+  EXPECT_DOUBLE_EQ(history.At(AtMs(380), MountWithSigma(0.005)).value().sigma_rad, DegToRad(0.005));
 }
 
 }  // namespace

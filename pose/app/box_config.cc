@@ -1,0 +1,364 @@
+#include "pose/app/box_config.h"
+
+#include <filesystem>
+#include <fstream>
+#include <initializer_list>
+#include <set>
+#include <sstream>
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "pose/base/angle.h"
+#include "pose/rig/rig_yaml.h"
+
+namespace tbm {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+
+nanoseconds FromMs(double ms) { return nanoseconds(static_cast<std::int64_t>(ms * 1e6)); }
+
+// False for an absent section, which keeps its defaults, and for one of the wrong kind.
+bool IsSection(const YamlNode& node) {
+  if (!node.exists()) return false;
+  if (!node.IsMap()) node.Fault("must be a map of keys");
+  return node.IsMap();
+}
+
+// Reads optional members of one map into fields that hold their defaults, and remembers which names
+// it knows, so that the rest can be reported.
+class Section {
+ public:
+  explicit Section(const YamlNode& node) : node_(node) {}
+
+  void Number(
+      std::string_view name, double low, double high, std::string_view unit, double* value) {
+    const YamlNode member = Know(name);
+    if (!member.exists()) return;
+    if (const auto number = member.Number({low, high, unit})) *value = *number;
+  }
+  void Time(std::string_view name, double low_ms, double high_ms, nanoseconds* value) {
+    double ms = 1e-6 * static_cast<double>(value->count());
+    Number(name, low_ms, high_ms, "ms", &ms);
+    *value = FromMs(ms);
+  }
+  void Angle(std::string_view name, double low_deg, double high_deg, double* value_rad) {
+    double deg = RadToDeg(*value_rad);
+    Number(name, low_deg, high_deg, "degree", &deg);
+    if (deg != RadToDeg(*value_rad)) *value_rad = DegToRad(deg);
+  }
+  void Integer(std::string_view name, int low, int high, int* value) {
+    const YamlNode member = Know(name);
+    if (!member.exists()) return;
+    if (const auto number = member.Integer(low, high)) *value = *number;
+  }
+  void Text(std::string_view name, std::string* value) {
+    const YamlNode member = Know(name);
+    if (!member.exists()) return;
+    if (const auto text = member.Text()) *value = *text;
+  }
+  void Flag(std::string_view name, bool* value) {
+    std::string word = *value ? "true" : "false";
+    if (Word(name, {"true", "false"}, &word)) *value = word == "true";
+  }
+  // One of `words`; false and a fault otherwise. True also when the member is absent.
+  bool Word(std::string_view name,
+            std::initializer_list<std::string_view> words,
+            std::string* value) {
+    const YamlNode member = Know(name);
+    if (!member.exists()) return true;
+    const auto text = member.Text();
+    if (!text) return false;
+    for (const std::string_view word : words) {
+      if (*text == word) {
+        *value = *text;
+        return true;
+      }
+    }
+    member.Fault(fmt::format("'{}' is not one of {}", *text, fmt::join(words, ", ")));
+    return false;
+  }
+  void Texts(std::string_view name, std::vector<std::string>* value) {
+    const YamlNode member = Know(name);
+    if (!member.exists()) return;
+    if (!member.IsList()) {
+      member.Fault("must be a list, e.g. [127.0.0.1]");
+      return;
+    }
+    value->clear();
+    for (const YamlNode& item : member.Items()) {
+      if (const auto text = item.Text()) value->push_back(*text);
+    }
+  }
+  YamlNode Know(std::string_view name) {
+    known_.insert(std::string(name));
+    return node_.Optional(name);
+  }
+  YamlNode Require(std::string_view name, std::string_view what_would_be_right) {
+    known_.insert(std::string(name));
+    return node_.Required(name, what_would_be_right);
+  }
+  // A mistyped optional key would be lost silently; in a config it is a fault.
+  void RefuseOthers() const {
+    for (const std::string& name : node_.Names()) {
+      if (known_.count(name) != 0) continue;
+      node_.Optional(name).Fault(
+          fmt::format("nobody reads this key; known here: {}", fmt::join(known_, ", ")));
+    }
+  }
+
+ private:
+  YamlNode node_;
+  std::set<std::string> known_;
+};
+
+class Reader {
+ public:
+  Reader(std::string file, RigFileFaults* faults) : file_(std::move(file)), faults_(faults) {}
+
+  BoxConfig Read(const YamlNode& root) {
+    BoxConfig config;
+    if (!root.IsMap()) {
+      root.Fault("the file must be a map with machine_id, rig, camera, inclinometers");
+      return config;
+    }
+    Section section(root);
+    if (const auto id = section.Require("machine_id", "the machine's name, e.g. TBM-1").Text()) {
+      config.machine_id = *id;
+      if (id->empty() || id->size() > 32) {
+        root.Optional("machine_id").Fault("must have 1 to 32 characters");
+      }
+    }
+    if (const auto rig = section.Require("rig", "path of the rig file, e.g. rig.yaml").Text()) {
+      config.rig_file = Path(*rig);
+    }
+    ReadCamera(section.Require("camera", "a map with driver: gige | sim | replay"), &config);
+    ReadInclinometers(section.Require("inclinometers", "a map with target and camera"), &config);
+    ReadSolver(section.Know("solver"), &config);
+    ReadDds(section.Know("dds"), &config);
+    ReadRecording(section.Know("recording"), &config);
+    section.RefuseOthers();
+    return config;
+  }
+
+ private:
+  std::string Path(const std::string& path) const {
+    const std::filesystem::path given(path);
+    if (path.empty() || given.is_absolute()) return path;
+    return (std::filesystem::path(file_).parent_path() / given).string();
+  }
+
+  void ReadCamera(const YamlNode& node, BoxConfig* config) {
+    if (!IsSection(node)) return;
+    CameraConfig& camera = config->camera;
+    Section section(node);
+    std::string driver;
+    section.Require("driver", "gige, sim or replay");
+    if (section.Word("driver", {"gige", "sim", "replay"}, &driver)) {
+      camera.driver = driver == "gige"     ? CameraDriver::kGige
+                      : driver == "replay" ? CameraDriver::kReplay
+                                           : CameraDriver::kSim;
+    }
+    section.Text("address", &camera.address);
+    section.Integer("packet_size_bytes", 0, 16000, &camera.packet_size_bytes);
+    section.Flag("packet_socket", &camera.packet_socket);
+    section.Integer("socket_buffer_bytes", 65536, 268435456, &camera.socket_buffer_bytes);
+    section.Flag("packet_resend", &camera.packet_resend);
+    std::string format = "mono8";
+    if (section.Word("pixel_format", {"mono8", "mono12", "mono16"}, &format)) {
+      camera.pixel_format = format == "mono8"    ? PixelFormat::kMono8
+                            : format == "mono12" ? PixelFormat::kMono12
+                                                 : PixelFormat::kMono16;
+    }
+    std::string event = "exposure_end";
+    if (section.Word("stamp_event", {"exposure_start", "exposure_end"}, &event)) {
+      camera.stamp_event =
+          event == "exposure_end" ? StampEvent::kExposureEnd : StampEvent::kExposureStart;
+    }
+    section.Number("readout_latency_us", 0.0, 1e6, "us", &camera.readout_latency_us);
+    section.Number("frame_rate_hz", 0.1, 200.0, "Hz", &camera.frame_rate_hz);
+    section.Number("exposure_us", 1.0, 1e6, "us", &camera.exposure_us);
+    section.Number("exposure_min_us", 1.0, 1e6, "us", &camera.exposure_min_us);
+    section.Number("exposure_max_us", 1.0, 1e6, "us", &camera.exposure_max_us);
+    section.Flag("exposure_control", &config->exposure_control);
+    section.Integer("silent_after_ms", 0, 60000, &camera.silent_after_ms);
+    section.Text("run_folder", &camera.run_folder);
+    camera.run_folder = Path(camera.run_folder);
+    section.Flag("real_time", &camera.real_time);
+    section.RefuseOthers();
+    for (const std::string& fault : CheckCameraConfig(camera)) node.Fault(fault);
+  }
+
+  void ReadInclinometers(const YamlNode& node, BoxConfig* config) {
+    if (!IsSection(node)) return;
+    Section section(node);
+    const YamlNode target = section.Require("target", "a map with driver and port");
+    const YamlNode camera = section.Require("camera", "a map with driver and port");
+    section.RefuseOthers();
+    config->target_inclinometer.name = "target";
+    config->camera_inclinometer.name = "camera";
+    ReadInclinometer(target, &config->target_inclinometer);
+    ReadInclinometer(camera, &config->camera_inclinometer);
+    const InclinometerConfig both[] = {config->target_inclinometer, config->camera_inclinometer};
+    for (const ConfigFault& fault : FindSharingFaults(both)) {
+      node.Fault(fmt::format("{}: {}", fault.key, fault.message));
+    }
+  }
+
+  void ReadInclinometer(const YamlNode& node, InclinometerConfig* config) {
+    if (!IsSection(node)) return;
+    Section section(node);
+    std::string driver;
+    section.Require("driver", "modbus, rion68, bewis77, sim or replay");
+    if (section.Word("driver", {"modbus", "rion68", "bewis77", "sim", "replay"}, &driver) &&
+        !driver.empty()) {
+      config->driver = *InclinometerDriverFromWord(driver);
+    }
+    section.Text("port", &config->port.path);
+    section.Integer("baud", 1200, 921600, &config->port.baud);
+    std::string parity = "none";
+    if (section.Word("parity", {"none", "even", "odd"}, &parity)) {
+      config->port.parity = parity == "even"  ? Parity::kEven
+                            : parity == "odd" ? Parity::kOdd
+                                              : Parity::kNone;
+    }
+    section.Integer("stop_bits", 1, 2, &config->port.stop_bits);
+    section.Integer("address", 0, 255, &config->address);
+    section.Flag("automatic_output", &config->automatic_output);
+    section.Integer("automatic_rate_code", 0, 255, &config->automatic_rate_code);
+    section.Flag("swap_axes", &config->swap_axes);
+    section.Time("poll_period_ms", 5.0, 10'000.0, &config->poll_period);
+    section.Time("latency_ms", 0.0, 2000.0, &config->latency);
+    section.Time("response_timeout_ms", 5.0, 10'000.0, &config->response_timeout);
+    section.Time("byte_timeout_ms", 1.0, 1000.0, &config->byte_timeout);
+    section.Time("quiet_time_ms", 0.0, 10'000.0, &config->quiet_time);
+    section.Time("reconnect_period_ms", 10.0, 60'000.0, &config->reconnect_period);
+    section.Time("silent_after_ms", 10.0, 60'000.0, &config->silent_after);
+    section.Time("reopen_after_ms", 0.0, 600'000.0, &config->reopen_after);
+    section.Time("frozen_after_ms", 0.0, 86'400'000.0, &config->frozen_after);
+    section.Angle("range_deg", 0.01, 90.0, &config->range_rad);
+    section.Angle("max_step_deg", 0.001, 90.0, &config->max_step_rad);
+    section.Angle("sim_sigma_deg", 0.0, 1.0, &config->sim_sigma_rad);
+    section.Angle("sim_resolution_deg", 0.0, 1.0, &config->sim_resolution_rad);
+    ReadRegisters(section.Know("registers"), &config->registers);
+    section.RefuseOthers();
+    for (const ConfigFault& fault : FindFaults(*config)) {
+      node.Fault(fmt::format("{}: {}", fault.key, fault.message));
+    }
+  }
+
+  void ReadRegisters(const YamlNode& node, ModbusRegisterMap* map) {
+    if (!IsSection(node)) return;
+    Section section(node);
+    section.Integer("function", 3, 4, &map->function);
+    std::string format = "int16";
+    if (section.Word("format", {"int16", "uint16", "int32", "float32"}, &format)) {
+      map->format = format == "uint16"    ? RegisterFormat::kUint16
+                    : format == "int32"   ? RegisterFormat::kInt32
+                    : format == "float32" ? RegisterFormat::kFloat32
+                                          : RegisterFormat::kInt16;
+    }
+    std::string order = "high_first";
+    if (section.Word("word_order", {"high_first", "low_first"}, &order)) {
+      map->word_order = order == "low_first" ? WordOrder::kLowFirst : WordOrder::kHighFirst;
+    }
+    section.Integer("beta_register", 0, 65535, &map->beta_register);
+    section.Integer("gamma_register", 0, 65535, &map->gamma_register);
+    section.Angle("deg_per_lsb", -90.0, 90.0, &map->rad_per_lsb);
+    section.Integer("offset_lsb", 0, 65535, &map->offset_lsb);
+    int temperature = -1;
+    section.Integer("temperature_register", 0, 65535, &temperature);
+    if (temperature >= 0) map->temperature_register = temperature;
+    section.Number("celsius_per_lsb", 1e-6, 100.0, "degree C", &map->celsius_per_lsb);
+    section.RefuseOthers();
+  }
+
+  void ReadSolver(const YamlNode& node, BoxConfig* config) {
+    if (!IsSection(node)) return;
+    FrameSolverOptions& solver = config->solver;
+    Section section(node);
+    section.Time("tilt_max_age_ms", 1.0, 10'000.0, &solver.tilt.max_age);
+    nanoseconds wait = config->tilt_wait;
+    section.Time("tilt_wait_ms", 0.0, 1000.0, &wait);
+    config->tilt_wait = std::chrono::duration_cast<milliseconds>(wait);
+    double speed_mm_per_s = 1e3 * solver.motion_sigma_m_per_s;
+    section.Number("motion_sigma_mm_per_s", 0.1, 5000.0, "mm/s", &speed_mm_per_s);
+    solver.motion_sigma_m_per_s = 1e-3 * speed_mm_per_s;
+    double turn_deg_per_s = RadToDeg(solver.motion_sigma_rad_per_s);
+    section.Number("motion_sigma_deg_per_s", 0.001, 90.0, "degree/s", &turn_deg_per_s);
+    solver.motion_sigma_rad_per_s = DegToRad(turn_deg_per_s);
+    section.Time("prior_max_age_ms", 0.0, 600'000.0, &solver.prior_max_age);
+    section.RefuseOthers();
+  }
+
+  void ReadDds(const YamlNode& node, BoxConfig* config) {
+    if (!IsSection(node)) return;
+    Section section(node);
+    section.Integer("domain", 0, 232, &config->dds.domain);
+    section.Texts("interfaces", &config->dds.interfaces);
+    section.Texts("initial_peers", &config->dds.initial_peers);
+    section.RefuseOthers();
+    if (config->dds.interfaces.empty()) {
+      node.Fault("interfaces: empty; name at least one address of this computer, e.g. [127.0.0.1]");
+    }
+    for (const auto* list : {&config->dds.interfaces, &config->dds.initial_peers}) {
+      for (const std::string& address : *list) {
+        in_addr parsed{};
+        if (inet_pton(AF_INET, address.c_str(), &parsed) == 1) continue;
+        node.Fault(fmt::format("'{}' is not an IPv4 address such as 127.0.0.1", address));
+      }
+    }
+  }
+
+  void ReadRecording(const YamlNode& node, BoxConfig* config) {
+    if (!IsSection(node)) return;
+    BoxRecordingConfig& recording = config->recording;
+    Section section(node);
+    section.Text("folder", &recording.folder);
+    recording.folder = Path(recording.folder);
+    int minutes = static_cast<int>(recording.run_length.count());
+    section.Integer("run_length_min", 1, 1440, &minutes);
+    recording.run_length = std::chrono::minutes(minutes);
+    double limit_mb = 1e-6 * static_cast<double>(recording.limit_bytes);
+    section.Number("limit_mb", 10.0, 1e7, "MB", &limit_mb);
+    recording.limit_bytes = static_cast<std::int64_t>(limit_mb * 1e6);
+    section.RefuseOthers();
+  }
+
+  std::string file_;
+  RigFileFaults* faults_;
+};
+
+}  // namespace
+
+Result<BoxConfig, RigFileFaults> ParseBoxConfig(std::string_view yaml, const std::string& file) {
+  RigFileFaults faults;
+  BoxConfig config;
+  try {
+    const YAML::Node root = YAML::Load(std::string(yaml));
+    config = Reader(file, &faults).Read(YamlNode(root, "", file, &faults));
+  } catch (const YAML::Exception& error) {
+    faults.push_back({file, error.mark.line + 1, "", "not YAML: " + error.msg});
+  }
+  if (!faults.empty()) return Failure{std::move(faults)};
+  return config;
+}
+
+Result<BoxConfig, RigFileFaults> LoadBoxConfig(const std::string& path) {
+  constexpr std::size_t kLargest = 1'000'000;
+  std::ifstream stream(path, std::ios::binary);
+  std::ostringstream text;
+  if (!stream || !(text << stream.rdbuf())) {
+    return Failure{
+        RigFileFaults{{path, 0, "", "cannot be read; give the path of a camera_box.yaml"}}};
+  }
+  if (text.str().size() > kLargest) {
+    return Failure{RigFileFaults{{path, 0, "", "larger than 1 MB: not a configuration"}}};
+  }
+  return ParseBoxConfig(text.str(), path);
+}
+
+}  // namespace tbm
