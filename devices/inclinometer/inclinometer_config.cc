@@ -20,6 +20,9 @@ constexpr std::array<std::pair<std::string_view, InclinometerDriver>, 5> kDriver
     {"replay", InclinometerDriver::kReplay},
 }};
 
+// Characters of a question and an answer, of the longer frames and of a usual register map.
+constexpr std::size_t kLongestExchange = 22;
+
 bool HasPort(InclinometerDriver driver) {
   return driver != InclinometerDriver::kSim && driver != InclinometerDriver::kReplay;
 }
@@ -72,6 +75,13 @@ void CheckPort(const InclinometerConfig& config, Faults* faults) {
   faults->NeedMs("quiet_time_ms", config.quiet_time, 10, 10000);
   faults->NeedMs("reconnect_period_ms", config.reconnect_period, 20, 60000);
   faults->NeedMs("reopen_after_ms", config.reopen_after, 0, 600000);
+  const double line_ms = port.baud > 0 ? Milliseconds(port.LineTime(kLongestExchange)) : 0.0;
+  faults->Unless(Milliseconds(config.response_timeout) >= line_ms,
+                 "response_timeout_ms",
+                 fmt::format("is {}, but question and answer alone take {:.0f} ms at {} baud",
+                             Milliseconds(config.response_timeout),
+                             line_ms,
+                             port.baud));
   faults->Unless(
       config.quiet_time >= config.response_timeout,
       "quiet_time_ms",

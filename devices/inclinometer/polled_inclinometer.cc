@@ -5,7 +5,8 @@
 namespace tbm {
 namespace {
 
-constexpr std::chrono::seconds kSilentPollPeriod(1);
+constexpr int kDeadAfterFailures = 3;
+constexpr std::chrono::seconds kDeadPollPeriod(1);
 
 }  // namespace
 
@@ -32,6 +33,7 @@ Result<TiltSample, InclinometerFailure> PolledInclinometer::Read(
   if (turn.stale_bytes > 0) life_.OnStale();
   if (turn.was_asked) {
     life_.OnRequest();
+    failures_in_a_row_ = turn.result ? 0 : failures_in_a_row_ + 1;
     ScheduleNext(now);
   }
   if (!turn.result) {
@@ -65,12 +67,11 @@ TiltSample PolledInclinometer::Stamp(const TiltBus::Turn& turn) const {
 
 // Keeps the beat, but never tries to catch up on missed ones.
 void PolledInclinometer::ScheduleNext(std::chrono::steady_clock::time_point now) {
-  auto period = config_.poll_period;
-  if (is_wire_shared_ && life_.At(now).state == InclinometerState::kSilent) {
-    period = std::max<std::chrono::nanoseconds>(period, kSilentPollPeriod);
+  if (is_wire_shared_ && failures_in_a_row_ >= kDeadAfterFailures) {
+    due_ = now + std::max<std::chrono::nanoseconds>(config_.poll_period, kDeadPollPeriod);
+  } else {
+    due_ = std::max(due_ + config_.poll_period, now);
   }
-  due_ = std::max(due_ + period, now);
-  if (period != config_.poll_period) due_ = now + period;
 }
 
 }  // namespace tbm

@@ -11,8 +11,8 @@ namespace tbm {
 // An inclinometer that answers when asked, perhaps beside another one on the same wire.
 class PolledInclinometer final : public Inclinometer {
  public:
-  // `is_wire_shared`: while this one is silent it is asked only once a second, because each
-  // unanswered question keeps the wire from the other instrument for time-out and silence.
+  // `is_wire_shared`: after three failures in a row this one is asked only once a second, because
+  // each unanswered question keeps the wire from the other instrument for time-out and silence.
   PolledInclinometer(InclinometerConfig config,
                      std::shared_ptr<TiltBus> bus,
                      const Clock& clock,
@@ -33,6 +33,7 @@ class PolledInclinometer final : public Inclinometer {
   InclinometerLife life_;
   SampleGate gate_;
   int openings_seen_ = 0;
+  int failures_in_a_row_ = 0;
   std::chrono::steady_clock::time_point due_{};
 };
 

@@ -232,7 +232,7 @@ TEST_P(EveryDriver, SleepsWhileUnpluggedAndWhileSilent) {
     }
     const auto start = steady_clock::now();
     const double used_before = ProcessorSeconds();
-    while (steady_clock::now() < start + 1s) {
+    while (steady_clock::now() < start + 600ms) {
       [[maybe_unused]] const auto sample = Read();
     }
     const double wall_s = std::chrono::duration<double>(steady_clock::now() - start).count();
