@@ -231,7 +231,31 @@ CheckedPose Accept(const PoseProblem& problem,
   return checked;
 }
 
+// More than one exclusion mends a problem that fails the gate by little: noise out of the ordinary,
+// a small fault. The best of them goes out, marked, since the bound covers them all; where each
+// fits by lack of redundancy, nothing is left out.
+Result<CheckedPose, PoseReason> InDoubt(const PoseProblem& problem,
+                                        const PoseResult& whole,
+                                        const Exclusion& best,
+                                        const IntegrityOptions& options) {
+  if (!whole || ChiSquaredTail(whole->chi2, whole->dof) < options.doubt_limit) {
+    return Failure{PoseReason::kAmbiguous};
+  }
+  std::optional<CheckedPose> checked;
+  const bool same_minimum = best.pose && !best.twofold &&
+                            !FarApart(best.pose->camera_from_target, whole->camera_from_target);
+  if (same_minimum && best.pose->dof > 0) {
+    checked = Accept(problem, *best.pose, best.reading, options);
+  } else if (problem.leds.size() < problem.rig->leds.size()) {
+    checked = Accept(problem, *whole, std::nullopt, options);
+  }
+  if (!checked) return Failure{PoseReason::kAmbiguous};
+  checked->doubtful = true;
+  return *checked;
+}
+
 Result<CheckedPose, PoseReason> LeaveOneOut(const PoseProblem& problem,
+                                            const PoseResult& whole,
                                             const Starts& starts,
                                             const std::optional<PosePriorInfo>& prior,
                                             const IntegrityOptions& options,
@@ -249,7 +273,9 @@ Result<CheckedPose, PoseReason> LeaveOneOut(const PoseProblem& problem,
         Without(problem, exclusions[0].reading), prior->camera_from_target, solve_options);
   }
   if (verdict == Verdict::kNoneMends) return Failure{PoseReason::kInconsistent};
-  if (verdict == Verdict::kMoreThanOneMends) return Failure{PoseReason::kAmbiguous};
+  if (verdict == Verdict::kMoreThanOneMends) {
+    return InDoubt(problem, whole, exclusions[0], options);
+  }
   const Exclusion& found = exclusions[0];
   if (!found.pose) return Failure{ReasonOf(found.pose.error())};
   return Accept(problem, *found.pose, found.reading, options);
@@ -274,7 +300,7 @@ Result<CheckedPose, PoseReason> CheckPose(const PoseProblem& problem,
   Starts starts;
   if (start) starts.push_back(*start);
   if (whole) starts.push_back(whole->camera_from_target);
-  return LeaveOneOut(problem, starts, prior, options, solve_options);
+  return LeaveOneOut(problem, whole, starts, prior, options, solve_options);
 }
 
 }  // namespace tbm

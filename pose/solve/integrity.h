@@ -20,6 +20,10 @@ struct IntegrityOptions {
   // A reading is named as wrong only when leaving it out lowers chi2 by this much more than leaving
   // out any other: odds of 1000 to 1 between two explanations with equally many unknowns.
   double isolation_chi2 = 13.8;
+  // Where more than one exclusion mends a problem, there is a pose all the same (`doubtful`, its
+  // bound covers all of them) as long as chi2 of the whole is not rarer than this. Beyond it the
+  // solutions lie too far apart for one linearisation.
+  double doubt_limit = 1e-9;
   // The tilts are part of what "everything expected" means. False for vision by choice.
   bool expect_tilts = true;
   // A subset of the readings that leaves a larger sigma than this in any direction limits nothing:
@@ -43,6 +47,8 @@ struct CheckedPose {
   std::uint32_t leds_used = 0;      // bit i: rig LED i is in the solution
   std::optional<int> excluded_led;  // rig LED index whose centre was left out
   bool tilts_used = false;
+  // The gate closed, and the reading left out is only the likeliest of several that may be wrong.
+  bool doubtful = false;
 };
 
 // Sigma and protection level of one named point in `camera`.
@@ -62,8 +68,8 @@ using PointResults = FixedVector<PointResult, 16>;  // in the order of Rig::poin
 // since only together they say something about the relative pose; which of the two lies is for the
 // history of each to tell.
 //
-// Names a reading only when it alone explains the residuals. Where the image cannot decide (three
-// LEDs and tilts have no redundancy left with one out) the prior does, if there is one.
+// Where the image cannot decide which reading it is (three LEDs and tilts have no redundancy left
+// with one out) the prior does, if there is one. What remains in doubt says so.
 //
 // Status ok: all LEDs of the rig and the tilts used, gate passed. Degraded, the first that applies:
 // kLedExcluded, kTiltDisagrees, kTwoLeds, kFewLeds, kTiltMissing (the caller knows better why a
