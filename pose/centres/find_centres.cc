@@ -3,26 +3,28 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <span>
 #include <vector>
 
 #include "pose/base/check.h"
+#include "pose/centres/any_above.h"
 #include "pose/centres/image_levels.h"
 #include "pose/centres/label_runs.h"
 #include "pose/centres/measure_spot.h"
-#include "pose/centres/row_max.h"
 #include "pose/centres/split_blobs.h"
 
 namespace tbm {
 namespace {
 
 constexpr int kBlockHeight = 8;
-constexpr int kThresholdWidth = 16;  // columns that share one threshold
+constexpr std::size_t kPiecesPerBlock = kBlockWidth / LevelMap::kPieceWidth;
+static_assert(kPiecesPerBlock == 4);
 constexpr std::size_t kMaxRuns = 32768;
 constexpr std::size_t kMaxNeighbours = 8;
 
 // What rises less than this above its surroundings is no lamp: pipes, wet walls.
-constexpr double kLowestOffset = 1.0 / 40.0;  // of full scale
+constexpr double kLowestOffset = 1.0 / 28.0;  // of full scale
 // Assumed until the spots themselves tell: a small sensor's well, so that sigmas err to the large.
 constexpr double kAssumedWellElectrons = 10000.0;
 constexpr double kLargestWellElectrons = 100000.0;
@@ -39,6 +41,35 @@ bool Near(const SpotFit& a, const SpotFit& b) {
   const double reach =
       5.0 * (std::max(a.sigma_u_px, a.sigma_v_px)) + 4.0 * std::max(b.sigma_u_px, b.sigma_v_px);
   return std::abs(a.u_px - b.u_px) < reach && std::abs(a.v_px - b.v_px) < reach;
+}
+
+double PixelAt(const ImageView& image, double u_px, double v_px) {
+  const int u = std::clamp(static_cast<int>(std::lround(u_px)), 0, image.width_px - 1);
+  const int v = std::clamp(static_cast<int>(std::lround(v_px)), 0, image.height_px - 1);
+  const std::byte* at = static_cast<const std::byte*>(image.pixels) + v * image.stride_bytes +
+                        static_cast<std::ptrdiff_t>(u) * image.bytes_per_pixel;
+  return image.bytes_per_pixel == 1 ? LoadPixel<std::uint8_t>(at) : LoadPixel<std::uint16_t>(at);
+}
+
+// A cheap look before the fit: on every line through a spot the light falls off to at least one
+// side. On a pipe, a cable or the wall it goes on to both.
+bool StandsOut(const ImageView& image, const SpotGuess& guess, double lowest_contrast_dn) {
+  constexpr int kLines = 8;
+  const double reach_px = 3.0 * guess.spread_px + 1.0;
+  double lowest = image.max_value;
+  double highest_of_lower = 0.0;
+  for (int i = 0; i < kLines; ++i) {
+    const double angle = i * std::numbers::pi / kLines;
+    const double du = reach_px * std::cos(angle);
+    const double dv = reach_px * std::sin(angle);
+    const double lower = std::min(PixelAt(image, guess.u_px + du, guess.v_px + dv),
+                                  PixelAt(image, guess.u_px - du, guess.v_px - dv));
+    lowest = std::min(lowest, lower);
+    highest_of_lower = std::max(highest_of_lower, lower);
+  }
+  const double peak = std::min<double>(guess.background_dn + guess.amplitude_dn, image.max_value);
+  const double contrast = peak - lowest;
+  return contrast > lowest_contrast_dn && peak - highest_of_lower > 0.4 * contrast;
 }
 
 // Difference of the two axes' second moments and twice the mixed moment: what has a direction.
@@ -69,14 +100,18 @@ struct CentreFinder::WorkSpace {
   std::vector<Candidate> candidates;
   std::vector<std::size_t> order;
   std::vector<double> sorted;
+  std::vector<int> thresholds;        // of a strip of blocks, per piece
+  std::vector<int> lowest_threshold;  // of each block
+  std::vector<std::size_t> bright_blocks;
   FoundCentres found;
   double offset_dn = 0.0;  // of the threshold above the level
   double gain = 0.0;
 
   template <class Pixel>
   void ScanImage(const ImageView& image);
+  void SetThresholds(float v_px);
   template <class Pixel>
-  void ScanBlock(const ImageView& image, int column, int row, int columns, int rows);
+  void ScanRow(const std::byte* row_start, int row, const ImageView& image);
   std::size_t CollectGuesses(const ImageView& image, const FinderOptions& options);
   void MeasureAll(const ImageView& image, const FinderOptions& options);
   void MeasureNeighbours(const ImageView& image, const SensorNoise& noise);
@@ -128,54 +163,61 @@ Result<const FoundCentres*, ImageFailure> CentreFinder::Find(const ImageView& im
   return &work.found;
 }
 
-// The one pass over the image: the brightest pixel of each block against the lowest threshold that
-// any pixel of it may have. Only blocks that exceed it are looked at again.
+// The one pass over the image: the brightest pixel of each block against the lowest threshold of
+// its pieces. Only blocks that exceed it are looked at again, while they are in the cache.
 template <class Pixel>
 void CentreFinder::WorkSpace::ScanImage(const ImageView& image) {
+  static_assert(LevelMap::kTileSize == kBlockWidth);
   const auto* first = static_cast<const std::byte*>(image.pixels);
-  static_assert(LevelMap::kTileSize == kBlockWidth && LevelMap::kTileSize % kBlockHeight == 0);
-  std::array<int, 256> bright;  // of one strip of blocks; wider images go in several parts
   for (int row = 0; row < image.height_px; row += kBlockHeight) {
     const int rows = std::min(kBlockHeight, image.height_px - row);
-    for (int part = 0; part < image.width_px; part += kBlockWidth * 256) {
-      std::size_t count = 0;
-      const int part_end = std::min(image.width_px, part + kBlockWidth * 256);
-      for (int column = part; column < part_end; column += kBlockWidth) {
-        const int columns = std::min(kBlockWidth, image.width_px - column);
-        const std::byte* at = first + row * image.stride_bytes + column * int{sizeof(Pixel)};
-        const Pixel brightest = columns == kBlockWidth
-                                    ? BlockMax<Pixel>(at, image.stride_bytes, rows)
-                                    : BlockMaxPlain<Pixel>(at, image.stride_bytes, columns, rows);
-        const float lowest = levels.LowestAround(column / kBlockWidth, row / LevelMap::kTileSize);
-        if (brightest > lowest + static_cast<float>(offset_dn)) bright[count++] = column;
-      }
-      for (int y = row; y < row + rows && count > 0; ++y) {
-        for (std::size_t i = 0; i < count; ++i) {
-          const int columns = std::min(kBlockWidth, image.width_px - bright[i]);
-          ScanBlock<Pixel>(image, bright[i], y, columns, 1);
-        }
-      }
+    SetThresholds(static_cast<float>(row) + 0.5f * static_cast<float>(rows - 1));
+    bright_blocks.clear();
+    for (int column = 0; column < image.width_px; column += kBlockWidth) {
+      const int columns = std::min(kBlockWidth, image.width_px - column);
+      const std::byte* at = first + row * image.stride_bytes + column * int{sizeof(Pixel)};
+      const auto block = static_cast<std::size_t>(column / kBlockWidth);
+      const int threshold = lowest_threshold[block];
+      const bool bright =
+          columns == kBlockWidth
+              ? AnyAbove<Pixel>(at, image.stride_bytes, rows, threshold)
+              : AnyAbovePlain<Pixel>(at, image.stride_bytes, columns, rows, threshold);
+      if (bright) bright_blocks.push_back(block);
+    }
+    for (int y = row; y < row + rows && !bright_blocks.empty(); ++y) {
+      ScanRow<Pixel>(first + y * image.stride_bytes, y, image);
     }
   }
 }
 
-template <class Pixel>
-void CentreFinder::WorkSpace::ScanBlock(
-    const ImageView& image, int column, int row, int columns, int rows) {
-  (void)rows;
-  const auto* row_start = static_cast<const std::byte*>(image.pixels) + row * image.stride_bytes;
-  if (columns == kBlockWidth) {
-    const float lowest = levels.LowestAround(column / kBlockWidth, row / LevelMap::kTileSize);
-    const std::byte* at = row_start + column * int{sizeof(Pixel)};
-    if (BlockMax<Pixel>(at, image.stride_bytes, 1) <= lowest + static_cast<float>(offset_dn))
-      return;
+void CentreFinder::WorkSpace::SetThresholds(float v_px) {
+  const std::span<const float> level = levels.AlongRow(v_px);
+  thresholds.resize(level.size());
+  lowest_threshold.resize(level.size() / kPiecesPerBlock);
+  for (std::size_t i = 0; i < level.size(); ++i) {
+    thresholds[i] = static_cast<int>(level[i] + static_cast<float>(offset_dn));
   }
-  for (int x = column; x < column + columns; x += kThresholdWidth) {
-    const int width = std::min(kThresholdWidth, column + columns - x);
-    const float level = levels.At(static_cast<float>(x) + 0.5f * static_cast<float>(width),
-                                  static_cast<float>(row));
-    const int threshold = static_cast<int>(level + static_cast<float>(offset_dn));
-    labeller.Scan<Pixel>(row_start, row, x, x + width, threshold, image.max_value);
+  for (std::size_t i = 0; i < lowest_threshold.size(); ++i) {
+    const int* piece = &thresholds[i * kPiecesPerBlock];
+    lowest_threshold[i] = std::min(std::min(piece[0], piece[1]), std::min(piece[2], piece[3]));
+  }
+}
+
+template <class Pixel>
+void CentreFinder::WorkSpace::ScanRow(const std::byte* row_start, int row, const ImageView& image) {
+  for (const std::size_t block : bright_blocks) {
+    const int column = static_cast<int>(block) * kBlockWidth;
+    const int columns = std::min(kBlockWidth, image.width_px - column);
+    if (columns == kBlockWidth &&
+        !AnyAbove<Pixel>(row_start + column * int{sizeof(Pixel)}, 0, 1, lowest_threshold[block])) {
+      continue;
+    }
+    for (std::size_t piece = 0; piece < kPiecesPerBlock; ++piece) {
+      const int begin = column + static_cast<int>(piece) * LevelMap::kPieceWidth;
+      const int end = std::min(begin + LevelMap::kPieceWidth, image.width_px);
+      labeller.Scan<Pixel>(
+          row_start, row, begin, end, thresholds[block * kPiecesPerBlock + piece], image.max_value);
+    }
   }
 }
 
@@ -217,7 +259,8 @@ void CentreFinder::WorkSpace::MeasureAll(const ImageView& image, const FinderOpt
   }
   candidates.clear();
   for (const SpotGuess& guess : splitter.guesses()) {
-    if (guess.spread_px > 1.5 * options.max_spread_px) {
+    if (guess.spread_px > 1.5 * options.max_spread_px ||
+        !StandsOut(image, guess, 0.7 * options.min_snr * found.levels.noise_dn)) {
       ++found.levels.rejected_spots;
       continue;
     }

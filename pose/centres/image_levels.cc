@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "pose/centres/row_max.h"
+#include "pose/centres/any_above.h"
 
 namespace tbm {
 namespace {
@@ -16,6 +16,12 @@ constexpr float kSteepestSlope = 0.5f / 255.0f;
 // Differences beyond are structure in any image; the last bin collects them.
 constexpr std::uint32_t kLargestDifference = 4095;
 
+// The second smallest.
+int SecondOfFour(int a, int b, int c, int d) {
+  return std::min(std::max(std::min(a, b), std::min(c, d)),
+                  std::min(std::max(a, b), std::max(c, d)));
+}
+
 int TilesAcross(int pixels) { return (pixels + LevelMap::kTileSize - 1) / LevelMap::kTileSize; }
 
 }  // namespace
@@ -25,8 +31,8 @@ void LevelMap::Measure(const ImageView& image) {
   rows_ = TilesAcross(image.height_px);
   const std::size_t tiles = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
   level_.resize(tiles);
-  lowest_.resize(tiles);
   scratch_.resize(tiles);
+  along_row_.resize(static_cast<std::size_t>(columns_ * (kTileSize / kPieceWidth)));
   difference_count_.assign(std::min(image.max_value, kLargestDifference) + 1, 0);
   if (image.bytes_per_pixel == 1) {
     Sample<std::uint8_t>(image);
@@ -49,7 +55,7 @@ void LevelMap::Sample(const ImageView& image) {
     for (int tile_column = 0; tile_column < columns_; ++tile_column) {
       const int x0 = tile_column * kTileSize;
       const int width = std::min(kTileSize, image.width_px - x0);
-      std::array<std::uint16_t, kSamplesPerTile> sample;
+      std::array<int, kSamplesPerTile> sample;
       for (int i = 0; i < kSamplesPerTile; ++i) {
         const int row = i / 4;
         // Each row of samples starts elsewhere, so that nothing periodic hides between them.
@@ -57,15 +63,20 @@ void LevelMap::Sample(const ImageView& image) {
         const int y = y0 + (2 * row + 1) * height / 8;
         const std::byte* at = first + y * image.stride_bytes + x * int{sizeof(Pixel)};
         const int here = LoadPixel<Pixel>(at);
-        sample[static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(here);
+        sample[static_cast<std::size_t>(i)] = here;
         saturated += static_cast<std::uint32_t>(here) >= image.max_value;
-        if (x + 1 < image.width_px) {
+        // Every other sample will do for the noise: thousands of differences in a camera's image.
+        if (i % 2 == 0 && x + 1 < image.width_px) {
           const int step = std::abs(LoadPixel<Pixel>(at + sizeof(Pixel)) - here);
           ++difference_count_[static_cast<std::size_t>(std::min(step, top_bin))];
         }
       }
-      std::nth_element(sample.begin(), sample.begin() + 5, sample.end());
-      level_[Index(tile_column, tile_row)] = sample[5];
+      const auto low = [&sample](std::size_t row) {
+        return SecondOfFour(
+            sample[4 * row], sample[4 * row + 1], sample[4 * row + 2], sample[4 * row + 3]);
+      };
+      level_[Index(tile_column, tile_row)] =
+          static_cast<float>(SecondOfFour(low(0), low(1), low(2), low(3)));
     }
   }
   saturated_fraction_ =
@@ -120,11 +131,6 @@ void LevelMap::LimitByNeighbours(float limit_dn) {
       level = std::min(level, lowest_of_nine(scratch_, column, row) + limit_dn);
     }
   }
-  for (int row = 0; row < rows_; ++row) {
-    for (int column = 0; column < columns_; ++column) {
-      lowest_[Index(column, row)] = lowest_of_nine(level_, column, row);
-    }
-  }
 }
 
 float LevelMap::At(float u_px, float v_px) const {
@@ -140,6 +146,33 @@ float LevelMap::At(float u_px, float v_px) const {
   const float upper = level_[Index(left, top)] * (1.0f - fx) + level_[Index(right, top)] * fx;
   const float lower = level_[Index(left, bottom)] * (1.0f - fx) + level_[Index(right, bottom)] * fx;
   return upper * (1.0f - fy) + lower * fy;
+}
+
+std::span<const float> LevelMap::AlongRow(float v_px) {
+  constexpr float kTile = static_cast<float>(kTileSize);
+  constexpr int kPieces = kTileSize / kPieceWidth;
+  const float y = std::clamp(v_px / kTile - 0.5f, 0.0f, static_cast<float>(rows_ - 1));
+  const int top = static_cast<int>(y);
+  const int bottom = std::min(top + 1, rows_ - 1);
+  const float fraction = y - static_cast<float>(top);
+  const auto at_centre = [&](int column) {
+    return level_[Index(column, top)] * (1.0f - fraction) +
+           level_[Index(column, bottom)] * fraction;
+  };
+  float left = at_centre(0);
+  float centre = left;
+  for (int column = 0; column < columns_; ++column) {
+    const float right = column + 1 < columns_ ? at_centre(column + 1) : centre;
+    for (int piece = 0; piece < kPieces; ++piece) {
+      const float from_centre = (static_cast<float>(piece) + 0.5f) / kPieces - 0.5f;
+      const float other = from_centre < 0.0f ? left : right;
+      along_row_[static_cast<std::size_t>(column * kPieces + piece)] =
+          centre + std::abs(from_centre) * (other - centre);
+    }
+    left = centre;
+    centre = right;
+  }
+  return along_row_;
 }
 
 }  // namespace tbm

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "pose/centres/image_view.h"
@@ -23,10 +25,9 @@ class LevelMap {
 
   // Level at a place, bilinear between tile centres [DN].
   float At(float u_px, float v_px) const;
-  // Not above the level anywhere in the tile.
-  float LowestAround(int tile_column, int tile_row) const {
-    return lowest_[Index(tile_column, tile_row)];
-  }
+  // The levels of a strip of rows with the middle row `v_px`, for each kPieceWidth columns.
+  static constexpr int kPieceWidth = 16;
+  std::span<const float> AlongRow(float v_px);
 
   float median_dn() const { return median_dn_; }
   // Sigma of one dark pixel, the rounding to whole numbers included [DN].
@@ -49,8 +50,8 @@ class LevelMap {
   float noise_dn_ = 0.0f;
   float saturated_fraction_ = 0.0f;
   std::vector<float> level_;
-  std::vector<float> lowest_;
   std::vector<float> scratch_;
+  std::vector<float> along_row_;
   std::vector<std::uint32_t> difference_count_;  // histogram of |difference| of neighbouring pixels
 };
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pose/centres/row_max.h"
+#include "pose/centres/any_above.h"
 
 namespace tbm {
 

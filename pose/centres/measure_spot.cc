@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
-#include "pose/centres/row_max.h"
+#include "pose/centres/any_above.h"
 
 namespace tbm {
 namespace {
