@@ -1,13 +1,10 @@
 #pragma once
 
 #include "idl/cpp/messages.h"
-#include "tests/support/random.h"
 
 // One message of each topic in which every field has a value of its own, so that a field that is
 // forgotten, doubled or swapped with another shows.
 namespace tbm::dds::test {
-
-using tbm::test::Random;
 
 inline FrameFeatures FullFrameFeatures() {
   FrameFeatures m;
@@ -55,7 +52,6 @@ inline TiltReading FullTiltReading() {
 }
 
 inline RelativePose FullRelativePose() {
-  Random random("FullRelativePose");
   RelativePose m;
   m.machine_id = "machine-9";
   m.sensed_at.ns = 1'700'000'000'000'000'031;
@@ -64,11 +60,15 @@ inline RelativePose FullRelativePose() {
   m.rig_hash = "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef";
   m.status = PoseStatus::kDegraded;
   m.reason = PoseReason::kLedExcluded;
-  m.camera_from_target.rotation = random.Rotation();
+  m.camera_from_target.rotation = Eigen::Quaterniond(0.5, 0.1, -0.7, 0.5);
   m.camera_from_target.translation = {0.341, -0.342, 3.43};
-  Eigen::Matrix<double, 6, 6> root;
-  for (int i = 0; i < 36; ++i) root(i / 6, i % 6) = random.Normal(1e-3);
-  m.covariance = root * root.transpose();
+  // Thirty-six different numbers: below the rounding that the boundary allows, a transposed matrix
+  // still shows.
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      m.covariance(i, j) = (i == j ? 1e-3 * (i + 1) : 1e-5 * (i + j)) + 1e-11 * (6 * i + j);
+    }
+  }
   m.leds_used = 0x80000015u;  // LEDs 0, 2, 4 and 31
   m.excluded_led = 3;
   m.tilts_used = true;
