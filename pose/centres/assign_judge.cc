@@ -158,10 +158,68 @@ std::optional<Verdict> Judge(const Scene& scene, const Candidate& candidate, Use
   return verdict;
 }
 
+// The LED whose spot a false one would replace most easily.
+struct Weakest {
+  std::size_t match = 0;
+  double log_chance = -std::numeric_limits<double>::infinity();
+};
+
+// For each LED in turn: where all others (tilts and prior too) expect it, how surely, and how many
+// of the spots left over would fall at least as near by chance, on this LED or another one without
+// a spot.
+Weakest WeakestLed(const Scene& scene, const Verdict& verdict, UsePrior use_prior) {
+  const auto linear = Linearise(ProblemOf(scene, verdict.matches), verdict.camera_from_target);
+  TBM_CHECK(linear);
+  const Eigen::LLT<LinearisedProblem::RowsCovariance> noise(linear->covariance);
+  const LinearisedProblem::RowsByPose weighted_by_pose = noise.solve(linear->by_pose);
+  const LinearisedProblem::Rows weighted_residual = noise.solve(linear->residual);
+  Information information = linear->by_pose.transpose() * weighted_by_pose;
+  if (use_prior == UsePrior::kYes) information += scene.prior->information;
+  const Eigen::Index rows = linear->residual.size();
+  LinearisedProblem::RowsCovariance weight =
+      noise.solve(LinearisedProblem::RowsCovariance::Identity(rows, rows));
+  weight -= weighted_by_pose * information.ldlt().solve(weighted_by_pose.transpose());
+
+  const double others = static_cast<double>(verdict.matches.size()) - 1.0;
+  const double free_leds = static_cast<double>(scene.rig->leds.size()) - others;
+  const double free_spots = static_cast<double>(scene.spots.size()) - others;
+  Weakest weakest;
+  for (std::size_t i = 0; i < verdict.matches.size(); ++i) {
+    const Eigen::Index row = 2 * static_cast<Eigen::Index>(i);
+    const Eigen::Matrix2d of_led = weight.block<2, 2>(row, row);
+    const Eigen::Vector2d pull = weighted_residual.segment<2>(row);
+    const double distance2 = pull.dot(of_led.inverse() * pull);
+    const double log_chance = std::log(free_leds * free_spots) + LogBall(distance2, 2) -
+                              0.5 * std::log(of_led.determinant()) - std::log(scene.spot_area_px2);
+    if (!(log_chance <= weakest.log_chance)) weakest = {i, log_chance};
+  }
+  return weakest;
+}
+
+bool IsLikelyChance(double log_chance) { return !(log_chance < std::log(kMostChance)); }
+
+// Leaves out LEDs that a false spot may well be, as long as three remain that stand on their own.
+void LeaveOutWeak(const Scene& scene, UsePrior use_prior, Decision& decision) {
+  while (decision.best.matches.size() > 3) {
+    const Weakest weakest = WeakestLed(scene, decision.best, use_prior);
+    if (!IsLikelyChance(weakest.log_chance)) return;
+    Candidate fewer;
+    fewer.matches = decision.best.matches;
+    fewer.matches.erase(weakest.match);
+    fewer.fit.camera_from_target = decision.best.camera_from_target;
+    const std::optional<Verdict> verdict = Judge(scene, fewer, use_prior);
+    if (!verdict || IsLikelyChance(verdict->log_chance)) {
+      decision.outcome = Outcome::kAmbiguous;
+      return;
+    }
+    decision.best = *verdict;
+  }
+}
+
 }  // namespace
 
 Decision Decide(const Scene& scene, const Candidates& candidates, UsePrior use_prior) {
-  const std::size_t fewest_leds = scene.ups ? 2 : 3;
+  const std::size_t fewest_leds = scene.ups_are_sharp ? 2 : 3;
   Decision decision;
   double second_chi2 = std::numeric_limits<double>::infinity();
   for (const Candidate& candidate : candidates) {
@@ -182,8 +240,11 @@ Decision Decide(const Scene& scene, const Candidates& candidates, UsePrior use_p
   if (decision.outcome == Outcome::kNone) return decision;
   const double least_gap = scene.options.ambiguous_chi2_per_dof * std::max(1, decision.best.dof);
   const bool rivalled = second_chi2 - decision.best.chi2 < least_gap;
-  const bool by_chance = !(decision.best.log_chance < std::log(kMostChance));
-  if (rivalled || by_chance) decision.outcome = Outcome::kAmbiguous;
+  if (rivalled || IsLikelyChance(decision.best.log_chance)) {
+    decision.outcome = Outcome::kAmbiguous;
+    return decision;
+  }
+  LeaveOutWeak(scene, use_prior, decision);
   return decision;
 }
 

@@ -1,5 +1,7 @@
 #include "pose/centres/assign_leds.h"
 
+#include <algorithm>
+
 #include "pose/centres/assign_judge.h"
 #include "pose/centres/assign_scene.h"
 #include "pose/centres/assign_search.h"
@@ -39,7 +41,7 @@ Assignment AssignmentOf(const Scene& scene,
   }
   assignment.camera_from_target = verdict.camera_from_target;
   assignment.used_prior = used_prior;
-  assignment.without_tilts = !scene.ups;
+  assignment.without_tilts = !scene.ups_are_sharp;
   return assignment;
 }
 
@@ -47,6 +49,48 @@ Assignment AssignmentOf(const Scene& scene,
 bool OutweighsPrior(const Decision& by_image, const Decision& by_prior) {
   const std::size_t leds = by_image.best.matches.size();
   return leds >= 4 && leds > by_prior.best.matches.size();
+}
+
+// Three LEDs that agree with wrong tilts by chance, while four agree among themselves.
+bool ImageContradictsTilts(const Scene& scene, const Decision& by_image) {
+  if (!scene.ups_are_sharp || by_image.best.matches.size() > 3 || scene.spots.size() < 4)
+    return false;
+  Candidates doubting;
+  SearchByVision(Doubting(scene), doubting);
+  return std::any_of(doubting.begin(), doubting.end(), [&](const Candidate& candidate) {
+    return !Contains(candidate.matches, by_image.best.matches);
+  });
+}
+
+Result<Assignment, AssignFailure> AssignIn(const Scene& scene, const Centres& centres) {
+  const std::size_t fewest = scene.ups_are_sharp ? 2 : 3;
+  if (scene.spots.size() < fewest) return Failure{AssignFailure::kTooFewCentres};
+
+  Candidates by_image;
+  bool any_basis = false;
+  if (scene.ups_are_sharp) any_basis = SearchByTilts(scene, by_image);
+  Decision prior_says;
+  if (scene.prior) prior_says = DecideByPrior(scene, by_image);
+  const bool prior_clear = prior_says.outcome == Outcome::kClear;
+  if (!scene.ups_are_sharp) {
+    if (prior_clear) return AssignmentOf(scene, centres, prior_says.best, true);
+    any_basis = SearchByVision(scene, by_image);
+  }
+  const Decision image_says = DecideByImage(scene, by_image, any_basis);
+
+  if (image_says.outcome == Outcome::kClear) {
+    const bool same = prior_clear && SameMatches(image_says.best.matches, prior_says.best.matches);
+    if (same || (prior_clear && OutweighsPrior(image_says, prior_says))) {
+      return AssignmentOf(scene, centres, image_says.best, false);
+    }
+    if (prior_clear || ImageContradictsTilts(scene, image_says)) {
+      return Failure{AssignFailure::kAmbiguous};
+    }
+    return AssignmentOf(scene, centres, image_says.best, false);
+  }
+  if (prior_clear) return AssignmentOf(scene, centres, prior_says.best, true);
+  return Failure{image_says.outcome == Outcome::kAmbiguous ? AssignFailure::kAmbiguous
+                                                           : AssignFailure::kNoMatch};
 }
 
 }  // namespace
@@ -57,32 +101,18 @@ Result<Assignment, AssignFailure> AssignLeds(const Rig& rig,
                                              const std::optional<TiltObservation>& camera_tilt,
                                              const std::optional<PosePrior>& prior,
                                              const AssignOptions& options) {
+  return AssignIn(MakeScene(rig, centres, target_tilt, camera_tilt, prior, options), centres);
+}
+
+Result<Assignment, AssignFailure> AssignLedsDoubtingTilts(
+    const Rig& rig,
+    const Centres& centres,
+    const std::optional<TiltObservation>& target_tilt,
+    const std::optional<TiltObservation>& camera_tilt,
+    const std::optional<PosePrior>& prior,
+    const AssignOptions& options) {
   const Scene scene = MakeScene(rig, centres, target_tilt, camera_tilt, prior, options);
-  const std::size_t fewest = scene.ups ? 2 : 3;
-  if (scene.spots.size() < fewest) return Failure{AssignFailure::kTooFewCentres};
-
-  Candidates by_image;
-  bool any_basis = false;
-  if (scene.ups) any_basis = SearchByTilts(scene, by_image);
-  Decision prior_says;
-  if (scene.prior) prior_says = DecideByPrior(scene, by_image);
-  const bool prior_clear = prior_says.outcome == Outcome::kClear;
-  if (!scene.ups) {
-    if (prior_clear) return AssignmentOf(scene, centres, prior_says.best, true);
-    any_basis = SearchByVision(scene, by_image);
-  }
-  const Decision image_says = DecideByImage(scene, by_image, any_basis);
-
-  if (image_says.outcome == Outcome::kClear) {
-    if (!prior_clear || SameMatches(image_says.best.matches, prior_says.best.matches) ||
-        OutweighsPrior(image_says, prior_says)) {
-      return AssignmentOf(scene, centres, image_says.best, false);
-    }
-    return Failure{AssignFailure::kAmbiguous};
-  }
-  if (prior_clear) return AssignmentOf(scene, centres, prior_says.best, true);
-  return Failure{image_says.outcome == Outcome::kAmbiguous ? AssignFailure::kAmbiguous
-                                                           : AssignFailure::kNoMatch};
+  return AssignIn(Doubting(scene), centres);
 }
 
 }  // namespace tbm

@@ -115,6 +115,10 @@ std::optional<PriorPull> Pull(const std::optional<PosePrior>& prior) {
 
 }  // namespace
 
+double UpSigma(const UpPair& ups) {
+  return std::sqrt(0.5 * (ups.covariance_in_camera.trace() + ups.covariance_in_target.trace()));
+}
+
 Scene MakeScene(const Rig& rig,
                 const Centres& centres,
                 const std::optional<TiltObservation>& target_tilt,
@@ -131,8 +135,19 @@ Scene MakeScene(const Rig& rig,
     scene.target_tilt = target_tilt;
     scene.camera_tilt = camera_tilt;
   }
+  scene.ups_are_sharp = scene.ups && UpSigma(*scene.ups) <= kSharpUpSigmaRad;
   scene.prior = Pull(prior);
   return scene;
+}
+
+Scene Doubting(const Scene& scene) {
+  Scene doubting = scene;
+  if (!scene.ups) return doubting;
+  doubting.target_tilt->sigma_rad = kDoubtSigmaRad;
+  doubting.camera_tilt->sigma_rad = kDoubtSigmaRad;
+  doubting.ups = Ups(*scene.rig, doubting.target_tilt, doubting.camera_tilt);
+  doubting.ups_are_sharp = false;
+  return doubting;
 }
 
 }  // namespace tbm::assign

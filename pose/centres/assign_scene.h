@@ -45,6 +45,8 @@ struct Scene {
   const Rig* rig = nullptr;
   Spots spots;  // brightest first, ties by place: the caller's order does not matter
   std::optional<UpPair> ups;
+  // Tilts good enough to fix the vertical of a pair of spots; worse ones only weigh in a fit.
+  bool ups_are_sharp = false;
   std::optional<TiltObservation> target_tilt;  // both present exactly when `ups` is
   std::optional<TiltObservation> camera_tilt;
   std::optional<PriorPull> prior;
@@ -55,6 +57,12 @@ struct Scene {
 // A centre better than this is not believed: below it lens and finder are never known.
 inline constexpr double kLeastSigmaPx = 0.03;
 
+// One sigma of the angle between the two verticals, about any one axis [rad].
+double UpSigma(const UpPair& ups);
+
+// Above this the two verticals are not sharp: a pair of spots then fixes no pose.
+inline constexpr double kSharpUpSigmaRad = 0.01;
+
 // Spots outside the lens model, with a pixel or sigma that is not finite, or with a negative sigma
 // are left out. Tilts without an up vector and priors without an inverse count as absent.
 Scene MakeScene(const Rig& rig,
@@ -63,5 +71,8 @@ Scene MakeScene(const Rig& rig,
                 const std::optional<TiltObservation>& camera_tilt,
                 const std::optional<PosePrior>& prior,
                 const AssignOptions& options);
+
+// The same scene with tilts that may be wrong by several degrees: kDoubtSigmaRad for each output.
+Scene Doubting(const Scene& scene);
 
 }  // namespace tbm::assign

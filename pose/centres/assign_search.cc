@@ -47,8 +47,7 @@ class TiltSearch {
   TiltSearch(const Scene& scene, Candidates& found) : scene_(scene), found_(found) {
     const UpPair& ups = *scene.ups;
     level_from_target_ = Eigen::Quaterniond::FromTwoVectors(ups.up_in_target, ups.up_in_camera);
-    tilt_sigma_rad_ =
-        std::sqrt((ups.covariance_in_camera.trace() + ups.covariance_in_target.trace()) / 2.0);
+    tilt_sigma_rad_ = UpSigma(ups);
     focal_px_ = 0.5 * (scene.rig->camera.fx_px + scene.rig->camera.fy_px);
     for (const Led& led : scene.rig->leds) {
       const Eigen::Vector3d arm = level_from_target_ * led.p_led_in_target;

@@ -29,19 +29,20 @@ class Candidates {
 // Bounds of the work. Beyond them the faintest spots, then the last LED pairs, are not tried as
 // seeds; they still may join a seed that others made.
 inline constexpr int kSeedSpotsWithTilts = 32;
-inline constexpr int kSeedLedPairs = 40;
-inline constexpr int kSeedSpotsWithoutTilts = 10;
-inline constexpr int kSeedLedTriples = 20;
+inline constexpr int kSeedLedPairs = 24;
+inline constexpr int kSeedSpotsWithoutTilts = 12;
+inline constexpr int kSeedLedTriples = 12;
 inline constexpr int kMaxRefinedSeeds = 4000;
 
 // Every pair of LEDs on every pair of spots gives at most two poses through the up vectors;
 // wherever one of them explains a third spot, the three are fitted and extended. Returns whether
-// any pair of spots could be a pair of LEDs at all. Needs scene.ups.
+// any pair of spots could be a pair of LEDs at all. Needs scene.ups_are_sharp.
 bool SearchByTilts(const Scene& scene, Candidates& found);
 
 // Every triple of LEDs on every triple of spots gives at most four poses; wherever one of them
 // explains a fourth spot, the four are fitted and extended. Returns whether any triple of spots
-// could be a triple of LEDs at all. For scenes without ups.
+// could be a triple of LEDs at all. Where the scene has ups, poses that contradict them are left
+// out.
 bool SearchByVision(const Scene& scene, Candidates& found);
 
 // Pairs of spots inside the gates that the prior (with the tilts, when there are any) leaves.

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "pose/centres/assign_search.h"
 #include "pose/solve/p3p.h"
@@ -65,9 +66,20 @@ class VisionSearch {
                                     {LedAt(leds[0]), LedAt(leds[1]), LedAt(leds[2])});
     for (const Rigid3& pose : poses) {
       if (!IsDistance(pose, leds)) continue;
+      if (ContradictsUps(pose)) continue;
       any_triple_ = true;
       if (ExplainsFourth(pose, leds, spots)) TrySeed(pose, leds, spots);
     }
+  }
+
+  bool ContradictsUps(const Rigid3& pose) const {
+    if (!scene_.ups) return false;
+    const Eigen::Vector3d off = scene_.ups->up_in_camera - pose.rotation * scene_.ups->up_in_target;
+    // Three LEDs seen nearly face-on leave their own tilt uncertain by some degrees.
+    constexpr double kTripleSigmaRad = 0.03;
+    const double gate =
+        scene_.options.gate_sigma * std::hypot(UpSigma(*scene_.ups), kTripleSigmaRad);
+    return off.squaredNorm() > gate * gate;
   }
 
   // A coarse look before the fit: three centres place a fourth LED of a target seen nearly face-on
