@@ -36,7 +36,7 @@ enum class CameraFailure {
 // What is wrong with the pixels of one frame.
 enum class FrameFault {
   kNone,
-  kMissingPackets,  // parts of the image never came and hold an older image
+  kMissingPackets,  // parts of the image never came; no pixels
   kFileMissing,     // replay: no such file; no pixels
   kFileUnreadable,  // replay: cut or damaged; no pixels
   kFileSize,        // replay: not the size that the run's rig is for; no pixels
@@ -45,7 +45,7 @@ enum class FrameFault {
 // One exposure. It borrows its pixels: they stay valid until the next call of WaitFrame or Close on
 // the same camera, and belong to the thread that made that call.
 struct Frame {
-  ImageView image;                 // pixels == nullptr when there are none
+  ImageView image;                 // pixels == nullptr unless complete()
   Timestamp sensed_at;             // middle of the exposure
   Timestamp received_at;           // first packet at this computer; equals sensed_at in a replay
   std::uint64_t frame_number = 0;  // counts up by one per exposure; a gap is a lost frame
@@ -109,7 +109,7 @@ class Camera {
   virtual ~Camera() = default;
 
   // The next exposure. Waits up to `timeout`; beyond it only while a connection is being opened or
-  // a dead one closed (GigE: 3 s, 6 s at worst, see gige_camera.h). No heap of ours in the frame
+  // a dead one closed (GigE: 3 s, 9 s at worst, see gige_camera.h). No heap of ours in the frame
   // path. After a failure ask again: kEndOfRun and kBadRun are the only ones that stay.
   virtual Result<Frame, CameraFailure> WaitFrame(Duration timeout) = 0;
 

@@ -116,6 +116,7 @@ struct GigeCamera::Connection {
   ArvBuffer* lent = nullptr;
   gulong control_lost_handler = 0;
   std::atomic<bool> is_control_lost = false;
+  bool is_answering = false;        // when it is closed: a dead camera need not be told to stop
   std::uint64_t resent_before = 0;  // counted by the streams before this one
   bool had_frame = false;
   double exposure_min_us = 0.0;
@@ -140,8 +141,7 @@ struct GigeCamera::Connection {
   ~Connection() {
     if (control_lost_handler != 0) g_signal_handler_disconnect(device.get(), control_lost_handler);
     ReturnLent();
-    if (camera && stream && !is_control_lost.load())
-      arv_camera_stop_acquisition(camera.get(), nullptr);
+    if (camera && stream && is_answering) arv_camera_stop_acquisition(camera.get(), nullptr);
     stream.reset();
     camera.reset();
     device.reset();
@@ -359,18 +359,17 @@ std::optional<Frame> GigeCamera::Deliver(void* opaque) {
 
   Frame frame;
   frame.frame_number = step.frame_number;
-  FillImage(buffer, frame);
-  if (status != ARV_BUFFER_STATUS_SUCCESS) frame.fault = FrameFault::kMissingPackets;
+  frame.fault = FrameFault::kMissingPackets;
+  // Of a frame with holes the library does not even say how large its image is.
+  if (status == ARV_BUFFER_STATUS_SUCCESS) FillImage(buffer, frame);
   FillTimes(buffer, frame);
   CountFrame(frame, step, !std::exchange(connection_->had_frame, true));
   return frame;
 }
 
-// Leaves the image empty, and the frame incomplete, when the buffer is not what was asked for: then
-// the packet that describes it never came.
+// Leaves the image empty, and the frame incomplete, when the buffer is not what was asked for.
 void GigeCamera::FillImage(void* opaque, Frame& frame) const {
   auto* const buffer = static_cast<ArvBuffer*>(opaque);
-  frame.fault = FrameFault::kMissingPackets;
   if (arv_buffer_get_payload_type(buffer) != ARV_BUFFER_PAYLOAD_TYPE_IMAGE ||
       arv_buffer_get_image_pixel_format(buffer) != AravisFormat(config_.pixel_format)) {
     return;
@@ -442,17 +441,22 @@ void GigeCamera::ApplyExposure() {
 }
 
 CameraFailure GigeCamera::Drop(CameraFailure why, const std::string& detail) {
-  connection_.reset();
-  life_.Lost(std::chrono::steady_clock::now());
+  Disconnect();
   last_failure_ = why;
   board_.Fail(CameraState::kClosed, why, detail);
   return why;
 }
 
-void GigeCamera::Close() {
-  if (!connection_) return;
+void GigeCamera::Disconnect() {
+  connection_->is_answering =
+      !connection_->is_control_lost.load() && AnswersDiscovery(config_.address, kProbeTimeout);
   connection_.reset();
   life_.Lost(std::chrono::steady_clock::now());
+}
+
+void GigeCamera::Close() {
+  if (!connection_) return;
+  Disconnect();
   board_.Update([](CameraHealth& health) { health.state = CameraState::kClosed; });
 }
 

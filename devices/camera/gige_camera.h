@@ -50,6 +50,7 @@ class GigeCamera final : public Camera {
   void CountFrame(const Frame& frame, const FrameIdCounter::Step& step, bool is_first);
   void ApplyExposure();
   CameraFailure Drop(CameraFailure why, const std::string& detail);
+  void Disconnect();
   void ReportSocketBuffer();
 
   CameraConfig config_;
