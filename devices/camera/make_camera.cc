@@ -1,3 +1,6 @@
+#include <cstdlib>
+#include <utility>
+
 #include "devices/camera/gige_camera.h"
 #include "devices/camera/replay_camera.h"
 #include "devices/camera/sim_camera.h"
@@ -15,9 +18,9 @@ std::unique_ptr<Camera> MakeCamera(const CameraConfig& config,
       TBM_CHECK(world != nullptr);
       return std::make_unique<SimCamera>(config, clock, std::move(world), sim::ViewOptions{});
     case CameraDriver::kReplay:
-      break;
+      return std::make_unique<ReplayCamera>(config, clock);
   }
-  TBM_CHECK(false && "a driver without a maker");
+  std::abort();
 }
 
 }  // namespace tbm
