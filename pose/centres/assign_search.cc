@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -248,8 +249,8 @@ Nears NearSpots(const Scene& scene, const Expected& expected, std::size_t most) 
     const double gate = scene.options.gate_sigma * scene.options.gate_sigma;
     if (distance2 < gate) nears.push_back({s, distance2});
   }
-  std::stable_sort(nears.begin(), nears.end(), [](const Near& a, const Near& b) {
-    return a.distance2 < b.distance2;
+  std::sort(nears.begin(), nears.end(), [](const Near& a, const Near& b) {
+    return std::tie(a.distance2, a.spot) < std::tie(b.distance2, b.spot);
   });
   if (nears.size() > most) nears.resize(most);
   return nears;
