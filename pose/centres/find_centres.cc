@@ -391,10 +391,14 @@ void CentreFinder::WorkSpace::Report(const FinderOptions& options) {
     const double double_variance = beyond > 0.3 * spread * spread ? beyond : 0.0;
     const double noise_variance = 0.5 * (fit.by_dark_u_px2 + fit.by_dark_v_px2) +
                                   0.5 * gain * (fit.by_gain_u_px2 + fit.by_gain_v_px2);
+    // A step of the background under the spot pulls the centre by about its height by the spot's,
+    // in spreads, and the height is about twice the RMS; the same goes for light that has another
+    // shape than the model.
+    const double share = std::hypot(misfit, 2.0 * fit.background_structure_dn / fit.amplitude_dn);
+    const double structure_variance = share * share * spread * spread;
     Centre centre;
     centre.pixel_px = {fit.u_px, fit.v_px};
-    centre.sigma_px =
-        std::sqrt(noise_variance + misfit * misfit * spread * spread + double_variance);
+    centre.sigma_px = std::sqrt(noise_variance + structure_variance + double_variance);
     centre.peak_dn = fit.amplitude_dn;
     centre.background_dn = fit.background_dn;
     centre.spread_px = spread;

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <cstddef>
 #include <span>
 #include <vector>
 
 #include "pose/centres/image_view.h"
 #include "pose/centres/split_blobs.h"
+#include "pose/centres/spot_patch.h"
 
 namespace tbm {
 
@@ -25,6 +25,8 @@ struct SpotFit {
   double sigma_v_px = 0.0;
   double background_dn = 0.0;  // at the centre
   double background_variance_dn2 = 0.0;
+  // See BackgroundPlane.
+  double background_structure_dn = 0.0;
   double moment_uu_px2 = 0.0;  // of the spot itself, any direction of its long axis
   double moment_uv_px2 = 0.0;
   double moment_vv_px2 = 0.0;
@@ -65,56 +67,27 @@ class SpotMeter {
                       SpotFit* fit);
 
  private:
-  struct Box {
-    int left, right, top, bottom;  // ends included
-    int width() const { return right - left + 1; }
-    int height() const { return bottom - top + 1; }
-  };
-  struct Plane {
-    double level = 0.0;  // at the origin of the fit
-    double by_u = 0.0;
-    double by_v = 0.0;
-    double variance = 0.0;        // of a pixel around it
-    double slope_variance = 0.0;  // of by_u and by_v, the larger
-  };
   struct Scores;
-  struct Totals;
 
   SpotVerdict MeasureOnce(const ImageView& image,
                           const SpotGuess& guess,
                           const SensorNoise& noise,
                           std::span<const SpotFit* const> others,
                           SpotFit* fit);
-  template <class Pixel>
-  int CopyPatch(const ImageView& image);
-  void RemoveLight(const SpotFit& other);
-  bool FitPlane(const SensorNoise& noise, double u, double v);
-  bool PlaneThroughMedians(double noise_dn, double u, double v);
-  bool RefinePlane(double limit_dn, double u, double v);
-  void SubtractPlane(double u, double v);
   void FillTables(const SpotFit& fit);
   Scores Score(const SpotFit& fit, double gain) const;
   bool Improve(double gain, SpotFit* fit);
   void MaskNearClipping(const SpotFit& fit, double gain, double full_dn);
   bool MaskSingleBrightPixels(const SpotFit& fit, double gain);
-  void Conclude(double gain, SpotFit* fit);
-
-  float* Row(std::vector<float>& of, int row) {
-    return of.data() + static_cast<std::size_t>(row - outer_.top) * stride_;
-  }
-  const float* Row(const std::vector<float>& of, int row) const {
-    return of.data() + static_cast<std::size_t>(row - outer_.top) * stride_;
-  }
+  SpotVerdict Judge(const ImageView& image, const SpotGuess& guess, const SpotFit& fit) const;
+  void Conclude(double gain, SpotFit* fit) const;
 
   double min_spread_px_;
   double max_spread_px_;
-  Box outer_{};  // copied
-  Box inner_{};  // fitted; the rest of `outer_` is background
-  std::size_t stride_ = 0;
-  Plane plane_;
-  std::vector<float> value_;  // DN; plane subtracted inside `inner_` after FitPlane
-  std::vector<float> use_;    // 1, or 0 where masked
-  std::vector<float> gauss_u_, offset_u_, square_u_;  // per column of `inner_`
+  SpotPatch patch_;
+  // Per column and per row of the patch's inner window: Gaussian, distance [px], distance squared
+  // [sigma^2].
+  std::vector<float> gauss_u_, offset_u_, square_u_;
   std::vector<float> gauss_v_, offset_v_, square_v_;
 };
 
