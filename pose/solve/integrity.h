@@ -17,9 +17,9 @@ struct IntegrityOptions {
   double bound_risk = 1e-3;        // probability that the error exceeds `bound` (FORMATS §3)
   // Share of bound_risk: an explanation whose own residuals are rarer than this is dropped.
   double implausible_risk = 1e-4;
-  // A reading is named as wrong only when leaving it out lowers chi2 by this much more than leaving
-  // out any other: odds of 1000 to 1 between two explanations with equally many unknowns.
-  double isolation_chi2 = 13.8;
+  // A reading is named beyond doubt only when leaving it out lowers chi2 by this much more than
+  // leaving out any other: odds of 100 to 1 between two explanations with equally many unknowns.
+  double isolation_chi2 = 9.2;
   // Where more than one exclusion mends a problem, there is a pose all the same (`doubtful`, its
   // bound covers all of them) as long as chi2 of the whole is not rarer than this. Beyond it the
   // solutions lie too far apart for one linearisation.
