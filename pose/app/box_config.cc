@@ -189,7 +189,13 @@ class Reader {
     camera.run_folder = Path(camera.run_folder);
     section.Flag("real_time", &camera.real_time);
     section.RefuseOthers();
-    for (const std::string& fault : CheckCameraConfig(camera)) node.Fault(fault);
+    for (const std::string& fault : CheckCameraConfig(camera)) {
+      // "camera.<key>: <what>"
+      const std::size_t dot = fault.find('.');
+      const std::size_t colon = fault.find(": ", dot);
+      TBM_CHECK(colon != std::string::npos);
+      node.Optional(fault.substr(dot + 1, colon - dot - 1)).Fault(fault.substr(colon + 2));
+    }
   }
 
   void ReadInclinometers(const YamlNode& node, BoxConfig* config) {
@@ -246,7 +252,7 @@ class Reader {
     ReadRegisters(section.Know("registers"), &config->registers);
     section.RefuseOthers();
     for (const ConfigFault& fault : FindFaults(*config)) {
-      node.Fault(fmt::format("{}: {}", fault.key, fault.message));
+      node.Optional(fault.key).Fault(fault.message);
     }
   }
 
@@ -351,7 +357,8 @@ Result<BoxConfig, RigFileFaults> LoadBoxConfig(const std::string& path) {
   constexpr std::size_t kLargest = 1'000'000;
   std::ifstream stream(path, std::ios::binary);
   std::ostringstream text;
-  if (!stream || !(text << stream.rdbuf())) {
+  text << stream.rdbuf();
+  if (!stream.is_open() || stream.bad()) {
     return Failure{
         RigFileFaults{{path, 0, "", "cannot be read; give the path of a camera_box.yaml"}}};
   }

@@ -16,7 +16,7 @@ namespace tbm {
 
 // How the box speaks DDS. Mirrors idl/cpp's options so that configuration is readable without DDS.
 struct BoxDdsConfig {
-  int domain = 0;
+  int domain = 25;
   std::vector<std::string> interfaces = {"127.0.0.1"};  // IPv4 addresses; nothing else is used
   std::vector<std::string> initial_peers;               // for networks without multicast
 };

@@ -26,8 +26,16 @@ PoseReason ReasonOf(FrameFault fault) {
       return PoseReason::kFrameMissing;
     case FrameFault::kFileUnreadable:
       return PoseReason::kFrameUnreadable;
+    case FrameFault::kFileSize:
+      return PoseReason::kFrameSize;
   }
   return PoseReason::kFrameUnreadable;
+}
+
+// Angles enter the box in whole 1e-7 degree, far below any instrument's last digit: a recording in
+// degrees then gives back the very same bits.
+double AsRecorded(double angle_rad) {
+  return DegToRad(std::round(1e7 * RadToDeg(angle_rad)) / 1e7);
 }
 
 std::string_view WordOf(TiltSensor sensor) {
@@ -55,6 +63,7 @@ CameraBox::CameraBox(const BoxConfig& config,
 
 void CameraBox::Run(std::stop_token stop) {
   std::stop_source health_stop;
+  const std::stop_callback on_stop(stop, [&] { health_stop.request_stop(); });
   std::jthread health([this, token = health_stop.get_token()] { WatchHealth(token); });
   if (config_.camera.driver == CameraDriver::kReplay) {
     SolveReplay(stop);
@@ -96,7 +105,9 @@ void CameraBox::ReadTilts(TiltSensor sensor,
   while (!stop.stop_requested()) {
     const auto sample = inclinometer.Read(clock_.Steady() + kLook);
     if (sample) {
-      tilt_inbox_.Put({sample->sensed_at, sensor, sample->raw});
+      tilt_inbox_.Put({sample->sensed_at,
+                       sensor,
+                       {AsRecorded(sample->raw.beta_rad), AsRecorded(sample->raw.gamma_rad)}});
     } else if (sample.error() == InclinometerFailure::kNotFinite) {
       // A dead channel has its own reason in the pose, other than a tilt that merely gets old.
       tilt_inbox_.Put({clock_.Now(), sensor, {std::nan(""), std::nan("")}});
@@ -254,8 +265,7 @@ FrameCounts CameraBox::Counts() const {
 }
 
 void CameraBox::WatchHealth(const std::stop_token& stop) {
-  while (true) {
-    const bool is_last = stop.stop_requested();
+  while (!stop.stop_requested()) {
     if (parts_.camera) health_.Update("camera", HealthOf(parts_.camera->Health()));
     if (parts_.target_inclinometer) {
       health_.Update("inclinometer_target", HealthOf(parts_.target_inclinometer->Health()));
@@ -266,9 +276,10 @@ void CameraBox::WatchHealth(const std::stop_token& stop) {
     if (parts_.recorder) health_.Update("recorder", HealthOf(parts_.recorder->status()));
     health_.UpdatePose();
     health_.SendEvents();
-    if (is_last) return;
     std::this_thread::sleep_for(kLook);
   }
+  // What closes now closes on purpose and is no alarm.
+  health_.SendEvents();
 }
 
 }  // namespace tbm

@@ -74,3 +74,13 @@ function(tbm_fuzz name)
   set_target_properties(${name}_fuzz PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
   add_dependencies(fuzz_targets ${name}_fuzz)
 endfunction()
+
+# tbm_bench(solve DEPS ...)   builds tests/bench/solve_bench.cc into <build>/bin/bench.
+add_custom_target(benchmarks)
+function(tbm_bench name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  add_executable(${name}_bench ${PROJECT_SOURCE_DIR}/tests/bench/${name}_bench.cc ${ARG_SOURCES})
+  target_link_libraries(${name}_bench PRIVATE tbm_options ${ARG_DEPS})
+  set_target_properties(${name}_bench PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/bench)
+  add_dependencies(benchmarks ${name}_bench)
+endfunction()
