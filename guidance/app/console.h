@@ -16,6 +16,7 @@ struct Console {
   std::ostream& out;
   std::ostream& err;
   bool err_is_terminal = false;
+  bool out_is_terminal = false;
 };
 
 // "tbm: rig.yaml:7: .." on the error stream.

@@ -11,6 +11,7 @@
 #include "guidance/app/check_command.h"
 #include "guidance/app/completion.h"
 #include "guidance/app/solve_command.h"
+#include "guidance/app/watch_command.h"
 
 namespace tbm {
 namespace {
@@ -89,11 +90,24 @@ constexpr const char* kCheckHelp =
     "  tbm check poses.csv station.gsi --point shield_head --align rigid --report report\n"
     "      writes report/check.csv, check.json and check.png";
 
+constexpr const char* kWatchHelp =
+    "On a terminal: a screen that redraws itself, green ok, yellow degraded, red none. What is old "
+    "stands\n"
+    "in brackets with the status STALE: the age is the worse of the time since it came and the age "
+    "of its\n"
+    "stamp. Into a pipe: one line of key=value for each sample.\n"
+    "\n"
+    "Examples\n"
+    "  tbm watch\n"
+    "  tbm watch --interface 192.168.10.5 --domain 25\n"
+    "  tbm watch --seconds 5 | grep relative_pose";
+
 // All options of all commands, filled in by the parser.
 struct Requests {
   SolveRequest solve;
   SolveRequest centres;
   CheckRequest check;
+  WatchRequest watch;
   std::string align = "none";
   std::string format = "csv";
   std::string method = "fused";
@@ -159,6 +173,22 @@ CLI::App* AddCheck(CLI::App& app, Requests& requests) {
   return check;
 }
 
+CLI::App* AddWatch(CLI::App& app, Requests& requests) {
+  WatchRequest& request = requests.watch;
+  CLI::App* watch = app.add_subcommand("watch", "Live values of a running camera box");
+  watch->footer(kWatchHelp);
+  watch->add_option("--domain", request.domain_id, "DDS domain")
+      ->check(CLI::Range(0, 232))
+      ->capture_default_str();
+  watch->add_option(
+      "--interface", request.interfaces, "address or name of a network interface; 127.0.0.1");
+  watch->add_option(
+      "--peer", request.peers, "address of a machine to look for; none: by multicast");
+  watch->add_option("--seconds", request.seconds, "end after this time; 0: never")
+      ->check(CLI::Range(0.0, 1e9));
+  return watch;
+}
+
 CLI::App* AddCompletion(CLI::App& app, Requests& requests) {
   CLI::App* completion = app.add_subcommand("completion", "Completion script for a shell");
   completion->footer("Example, in ~/.bashrc:\n  source <(tbm completion bash)");
@@ -178,6 +208,7 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   const CLI::App* solve = AddSolve(app, requests);
   const CLI::App* centres = AddCentres(app, requests);
   const CLI::App* check = AddCheck(app, requests);
+  const CLI::App* watch = AddWatch(app, requests);
   const CLI::App* completion = AddCompletion(app, requests);
 
   std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
@@ -194,6 +225,7 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   if (solve->parsed()) return RunSolve(requests.solve, console);
   if (centres->parsed()) return RunCentres(requests.centres, console);
   if (check->parsed()) return RunCheck(requests.check, console);
+  if (watch->parsed()) return RunWatch(requests.watch, console);
   if (completion->parsed()) {
     console.out << (requests.shell == "bash" ? BashCompletion(app) : ZshCompletion(app));
   }

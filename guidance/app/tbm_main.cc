@@ -16,6 +16,8 @@ void ExitAsInternal(int) { ::_exit(static_cast<int>(tbm::ExitCode::kInternal)); 
 
 int main(int argument_count, char** arguments) {
   std::signal(SIGABRT, ExitAsInternal);
-  const tbm::Console console{std::cout, std::cerr, ::isatty(STDERR_FILENO) == 1};
+  std::signal(SIGPIPE, SIG_IGN);  // `tbm watch | head` ends by itself, like any command
+  const tbm::Console console{
+      std::cout, std::cerr, ::isatty(STDERR_FILENO) == 1, ::isatty(STDOUT_FILENO) == 1};
   return static_cast<int>(tbm::RunTbm({arguments + 1, arguments + argument_count}, console));
 }
