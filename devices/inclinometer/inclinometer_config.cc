@@ -92,14 +92,14 @@ void CheckRegisters(const ModbusRegisterMap& map, Faults* faults) {
   faults->Unless(map.function == 3 || map.function == 4,
                  "registers.function",
                  fmt::format("is {}, must be 3 or 4", map.function));
-  faults->NeedInt("registers.beta", map.beta_register, 0, 65534);
-  faults->NeedInt("registers.gamma", map.gamma_register, 0, 65534);
+  faults->NeedInt("registers.beta_register", map.beta_register, 0, 65534);
+  faults->NeedInt("registers.gamma_register", map.gamma_register, 0, 65534);
   if (map.temperature_register) {
-    faults->NeedInt("registers.temperature", *map.temperature_register, 0, 65534);
+    faults->NeedInt("registers.temperature_register", *map.temperature_register, 0, 65534);
   }
   faults->Unless(std::abs(map.beta_register - map.gamma_register) >= map.WordsPerAngle(),
-                 "registers.gamma",
-                 "overlaps registers.beta");
+                 "registers.gamma_register",
+                 "overlaps registers.beta_register");
   faults->Unless(
       map.Count() <= kMaxRegisterSpan,
       "registers",

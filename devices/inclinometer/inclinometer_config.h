@@ -37,7 +37,7 @@ struct InclinometerConfig {
   // Frames only: the instrument sends by itself instead of being asked. Only for one on a wire.
   bool automatic_output = false;
   int automatic_rate_code = 1;  // the instrument's own code; 1 is 5 Hz on the BEWIS AS400
-  bool swap_axes = false;       // frames and sim: the instrument's X is gamma
+  bool swap_axes = false;       // frames only: the instrument's X is gamma
 
   ModbusRegisterMap registers;
 
