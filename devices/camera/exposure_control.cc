@@ -20,7 +20,7 @@ double Median(std::array<double, N> values) {
 }  // namespace
 
 std::optional<double> ExposureControl::Update(const ExposureSample& sample) {
-  if (IsWaiting(sample.exposure_us)) return std::nullopt;
+  if (!(sample.exposure_us > 0.0) || IsWaiting(sample.exposure_us)) return std::nullopt;
   if (sample.is_saturated) return Step(sample.exposure_us, sample.exposure_us / kLargestStep);
   if (sample.leds.empty()) return Search(sample);
   without_leds_ = 0;

@@ -18,9 +18,9 @@ namespace tbm {
 // answer, 3 s when another program controls the camera (five register tries of 0.5 s), and closing
 // a connection whose camera died up to 6 s. So stopping the process takes that long at worst.
 //
-// Images are lent from kBuffers buffers allocated when the stream opens. Per frame Aravis itself
-// allocates, in its own receive thread, one record of the frame and one of its packets (tens of
-// bytes a packet); the thread that calls WaitFrame allocates nothing.
+// Images are lent from kBuffers buffers allocated when the stream opens. The thread that calls
+// WaitFrame allocates nothing per frame. Aravis' own receive thread does, twice: a record of the
+// frame (88 bytes) and one of its packets (16 bytes each), both as measured with 0.8.26.
 //
 // The first frame after opening is often incomplete: the socket buffer grows only once the stream
 // runs. It is handed out, flagged, and not counted as incomplete.

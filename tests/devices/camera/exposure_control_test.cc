@@ -207,6 +207,14 @@ TEST(ExposureControl, ASaturatedImageIsDarkenedAtOnce) {
   EXPECT_EQ(control.Update({40'000.0, kFullScale, {}, true}), 10'000.0);
 }
 
+TEST(ExposureControl, AnUnknownExposureIsNotRegulated) {
+  ExposureControl control({20.0, 50'000.0});
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_FALSE(control.Update({std::nan(""), kFullScale, {}, true}));
+    EXPECT_FALSE(control.Update({0.0, kFullScale, {}, false}));
+  }
+}
+
 TEST(ExposureControl, OneStepIsInFlightUntilItHasArrived) {
   ExposureControl control({20.0, 50'000.0});
   const std::vector<LedLevel> dim = {{40.0, false}};
