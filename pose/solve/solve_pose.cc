@@ -154,36 +154,65 @@ PoseResult Refine(const PoseProblem& problem,
   return Refinement(problem, tilts, options).Run(start);
 }
 
-// Four equations for four unknowns have two roots. Near the singular geometries (both LEDs on one
-// plumb line or at camera height, and the surface between: y1 |h|^2 = dv (p . h)) the roots merge,
-// and the sigma predicted at either one no longer says how far noise carries it: with n the noise
-// along the weak direction in sigmas, the roots stand 4 n of their predicted sigmas apart. Asking
-// for 20 keeps all geometries out that could be singular within five sigmas of noise.
+// Few LEDs leave two roots. Near the singular geometries (both LEDs on one plumb line or at camera
+// height, and the surface between: y1 |h|^2 = dv (p . h)) they merge, and the sigma predicted at
+// either one no longer says how far noise carries it: with n the noise along the weak direction in
+// sigmas, the roots stand 4 n of their predicted sigmas apart (pose/docs/pose_from_leds.md, "Two
+// LEDs"). Asking for 20 refuses all geometries that could be singular within five sigmas of noise.
 constexpr double kRootSeparationSigma = 20.0;
+// Two roots whose chi2 differ by less than this are not told apart by the noise: 1 to 400.
+constexpr double kClearlyBetterChi2 = 12.0;
+constexpr double kSamePoseRad = 1e-3;
 
+double TurnBetween(const Rigid3& a, const Rigid3& b) { return ErrorBetween(a, b).head<3>().norm(); }
+
+// The other root's place is the start pose's: exact for two LEDs, near enough for more.
 bool RootsMerge(const PoseEstimate& estimate, const TiltConstraint& tilts, const Rigid3& other) {
-  const Eigen::Vector3d turn = ErrorBetween(estimate.camera_from_target, other).head<3>();
   const Eigen::Vector3d& up = tilts.up_in_camera;
   const double sigma_rad = std::sqrt(up.dot(estimate.covariance.topLeftCorner<3, 3>() * up));
-  return turn.norm() < kRootSeparationSigma * sigma_rad;
+  return TurnBetween(estimate.camera_from_target, other) < kRootSeparationSigma * sigma_rad;
 }
 
-PoseResult SolvePair(const PoseProblem& problem,
+PoseResult SolveNearStart(const PoseProblem& problem,
+                          const TiltConstraint& tilts,
+                          const Rigid3& start,
+                          const SolveOptions& options) {
+  PoseResult result = Refine(problem, &tilts, start, options);
+  if (!result || problem.leds.size() > 3) return result;
+  const auto roots = StartPose(problem);
+  if (!roots) return Failure{roots.error()};
+  const auto& poses = roots->camera_from_target;
+  if (poses.size() < 2) return result;
+  const Rigid3& found = result->camera_from_target;
+  const bool is_first = TurnBetween(found, poses[0]) < TurnBetween(found, poses[1]);
+  const Rigid3& other = is_first ? poses[1] : poses[0];
+  if (RootsMerge(*result, tilts, other)) return Failure{PoseFailure::kNotObservable};
+  return result;
+}
+
+PoseResult SolveCold(const PoseProblem& problem,
                      const TiltConstraint& tilts,
-                     const std::optional<Rigid3>& start,
                      const SolveOptions& options) {
   const auto roots = StartPose(problem);
   if (!roots) return Failure{roots.error()};
   const auto& poses = roots->camera_from_target;
-  const PoseResult result = Refine(problem, &tilts, start ? *start : poses[0], options);
-  if (!result || poses.size() < 2) return result;
-  const auto distance = [&](const Rigid3& root) {
-    return ErrorBetween(result->camera_from_target, root).head<3>().norm();
-  };
-  const Rigid3& other = distance(poses[0]) > distance(poses[1]) ? poses[0] : poses[1];
-  if (RootsMerge(*result, tilts, other)) return Failure{PoseFailure::kNotObservable};
-  if (!start) return Failure{PoseFailure::kAmbiguous};
-  return result;
+  PoseResult best = Refine(problem, &tilts, poses[0], options);
+  if (poses.size() < 2) return best;
+  PoseResult other = Refine(problem, &tilts, poses[1], options);
+  if (!best || (other && other->chi2 < best->chi2)) std::swap(best, other);
+  if (!best) return best;
+  if (!other) {
+    // Two LEDs fit both roots exactly, whether or not the other one settles.
+    if (problem.leds.size() > 2) return best;
+    const bool is_weak = other.error() == PoseFailure::kNotObservable;
+    return Failure{is_weak ? PoseFailure::kNotObservable : PoseFailure::kAmbiguous};
+  }
+  if (TurnBetween(best->camera_from_target, other->camera_from_target) < kSamePoseRad) return best;
+  if (RootsMerge(*best, tilts, other->camera_from_target)) {
+    return Failure{PoseFailure::kNotObservable};
+  }
+  if (other->chi2 - best->chi2 < kClearlyBetterChi2) return Failure{PoseFailure::kAmbiguous};
+  return best;
 }
 
 }  // namespace
@@ -195,11 +224,8 @@ PoseResult SolveFused(const PoseProblem& problem,
   const auto tilts = TiltConstraint::From(problem);
   if (!tilts) return SolveVision(problem, start, options);
   if (problem.leds.size() < 2) return Failure{PoseFailure::kTooFewLeds};
-  if (problem.leds.size() == 2) return SolvePair(problem, *tilts, start, options);
-  if (start) return Refine(problem, &*tilts, *start, options);
-  const auto starts = StartPose(problem);
-  if (!starts) return Failure{starts.error()};
-  return Refine(problem, &*tilts, starts->camera_from_target[0], options);
+  return start ? SolveNearStart(problem, *tilts, *start, options)
+               : SolveCold(problem, *tilts, options);
 }
 
 PoseResult SolveVision(const PoseProblem& problem,
@@ -223,11 +249,8 @@ PoseResult SolveVision(const PoseProblem& problem,
       best = std::move(result);
       continue;
     }
-    const PoseError apart = ErrorBetween(best->camera_from_target, result->camera_from_target);
-    const bool is_same = apart.head<3>().norm() < 1e-3;
-    if (is_same) continue;
-    // Two minima whose chi2 differ by less than this are not told apart by the noise.
-    constexpr double kClearlyBetterChi2 = 12.0;
+    const double apart_rad = TurnBetween(best->camera_from_target, result->camera_from_target);
+    if (apart_rad < kSamePoseRad) continue;
     if (std::abs(best->chi2 - result->chi2) < kClearlyBetterChi2) {
       return Failure{PoseFailure::kAmbiguous};
     }

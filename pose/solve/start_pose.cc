@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
+#include <utility>
 
 #include <Eigen/QR>
 
+#include "pose/solve/cubic.h"
 #include "pose/solve/rows.h"
 
 namespace tbm {
@@ -24,6 +25,8 @@ struct Levelled {
   int count = 0;
   Eigen::Matrix3d camera_from_level;
   Eigen::Matrix3d target_from_level;
+  double seen_sigma = 0.0;      // of a bearing on the plane z = 1, centres and calibration residual
+  double tilt_sigma_rad = 0.0;  // of the level frames against each other
 };
 
 // Any rotation whose third column is `up`: level frames with the same z, free about it.
@@ -42,6 +45,17 @@ Eigen::Matrix3d RotationAt(const Levelled& levelled, double alpha, double beta) 
   return levelled.camera_from_level * between * levelled.target_from_level.transpose();
 }
 
+double SeenSigma(const PoseProblem& problem) {
+  const double residual_px = problem.rig->calibration_residual_px;
+  double sum_px2 = 0.0;
+  for (const LedObservation& led : problem.leds) {
+    const double centre_px = std::max(led.sigma_px, kLeastCentreSigmaPx);
+    sum_px2 += centre_px * centre_px + residual_px * residual_px;
+  }
+  const double leds = static_cast<double>(problem.leds.size());
+  return std::sqrt(sum_px2 / leds) / problem.rig->camera.fx_px;
+}
+
 // Takes the tilts and the lens out of the problem. False without usable tilts.
 bool Level(const PoseProblem& problem, Levelled& levelled) {
   const auto tilts = TiltConstraint::From(problem);
@@ -49,6 +63,9 @@ bool Level(const PoseProblem& problem, Levelled& levelled) {
   levelled.camera_from_level = BodyFromLevel(tilts->up_in_camera);
   levelled.target_from_level = BodyFromLevel(tilts->up_in_target);
   const Eigen::Matrix3d& a = levelled.camera_from_level;
+  levelled.seen_sigma = SeenSigma(problem);
+  levelled.tilt_sigma_rad =
+      std::sqrt(tilts->camera_covariance.trace() + tilts->target_deviation.squaredNorm());
   for (const LedObservation& led : problem.leds) {
     const auto seen = NormalisedFromPixel(problem.rig->camera, led.pixel_px);
     if (!seen) continue;  // outside the calibrated lens: the start does without it
@@ -106,19 +123,25 @@ bool Eliminate(const Levelled& levelled, Eliminated& out) {
   return true;
 }
 
+// One over the yaw sigma [rad] beyond which a pair says nothing about yaw: 6 degrees.
+constexpr double kLeastYawSignal = 10.0;
+
 // Roots of one linear equation h . (alpha, beta) + c = 0 on the unit circle: two LEDs. The rays of
 // both span a plane that holds the baseline, so only the yaw that turns the baseline into it fits.
 // Where noise leaves no root, the nearest point of the circle.
 FixedVector<Eigen::Vector2d, 2> RootsOfPair(const Levelled& levelled) {
   const Eigen::Vector3d normal =
       levelled.leds[0].seen.homogeneous().cross(levelled.leds[1].seen.homogeneous());
-  const Eigen::RowVector3d equation =
-      normal.transpose() * (levelled.leds[1].turned - levelled.leds[0].turned);
+  const Eigen::Matrix3d baseline = levelled.leds[1].turned - levelled.leds[0].turned;
+  const Eigen::RowVector3d equation = normal.transpose() * baseline;
   const Eigen::Vector2d h = equation.head<2>().transpose();
   const double c = equation[2];
   const double h_squared = h.squaredNorm();
+  // Both LEDs at camera height or on one plumb line: h is nothing but noise, every yaw fits.
+  const double h_sigma = levelled.seen_sigma * baseline.col(0).norm() +
+                         levelled.tilt_sigma_rad * normal.norm() * baseline.norm();
   FixedVector<Eigen::Vector2d, 2> roots;
-  if (!(h_squared > 0.0)) return roots;
+  if (!(std::sqrt(h_squared) > kLeastYawSignal * h_sigma)) return roots;
   const double off_circle = 1.0 - c * c / h_squared;
   if (off_circle <= 0.0) {
     roots.push_back((c > 0.0 ? -1.0 : 1.0) * h.normalized());
@@ -143,6 +166,26 @@ struct OnCircle {
         a2(0.5 * (form(0, 0) - form(1, 1))),
         b2(form(0, 1)) {}
 
+  OnCircle(double a0_, double a1_, double b1_, double a2_, double b2_)
+      : a0(a0_), a1(a1_), b1(b1_), a2(a2_), b2(b2_) {}
+
+  // The same with k counted from v.
+  OnCircle SeenFrom(const Eigen::Vector2d& v) const {
+    const double cos_2k = v.x() * v.x() - v.y() * v.y();
+    const double sin_2k = 2.0 * v.x() * v.y();
+    return {a0,
+            a1 * v.x() + b1 * v.y(),
+            b1 * v.x() - a1 * v.y(),
+            a2 * cos_2k + b2 * sin_2k,
+            b2 * cos_2k - a2 * sin_2k};
+  }
+
+  double Bend(const Eigen::Vector2d& v) const {
+    const double cos_2k = v.x() * v.x() - v.y() * v.y();
+    const double sin_2k = 2.0 * v.x() * v.y();
+    return -a1 * v.x() - b1 * v.y() - 4.0 * (a2 * cos_2k + b2 * sin_2k);
+  }
+
   double At(const Eigen::Vector2d& v) const {
     const double cos_2k = v.x() * v.x() - v.y() * v.y();
     const double sin_2k = 2.0 * v.x() * v.y();
@@ -155,7 +198,7 @@ struct OnCircle {
       const double cos_2k = v.x() * v.x() - v.y() * v.y();
       const double sin_2k = 2.0 * v.x() * v.y();
       const double slope = -a1 * v.y() + b1 * v.x() + 2.0 * (b2 * cos_2k - a2 * sin_2k);
-      const double bend = -a1 * v.x() - b1 * v.y() - 4.0 * (a2 * cos_2k + b2 * sin_2k);
+      const double bend = Bend(v);
       if (!(std::abs(bend) > 0.0)) return v;
       const double turn = std::clamp(-slope / std::abs(bend), -0.2, 0.2);
       v = Eigen::Vector2d(v.x() - turn * v.y(), v.y() + turn * v.x()).normalized();
@@ -165,32 +208,75 @@ struct OnCircle {
   }
 };
 
-// The lowest minimum first.
+// The lowest minimum first. One is found by Newton from the best of a few samples; seen from there
+// (k = 0, where the slope b1 + 2 b2 vanishes) the other stationary points are, with u = tan(k / 2),
+// the roots of 2 b2 u^3 + (4 a2 - a1) u^2 - 6 b2 u - (a1 + 4 a2). Minima as close as one likes come
+// out.
 FixedVector<Eigen::Vector2d, 2> MinimaOnCircle(const Eigen::Matrix3d& form) {
-  constexpr int kSamples = 16;
-  static const auto kCircle = [] {
-    std::array<Eigen::Vector2d, kSamples> circle;
-    for (int i = 0; i < kSamples; ++i) {
-      const double angle_rad = 2.0 * std::numbers::pi * i / kSamples;
-      circle[static_cast<std::size_t>(i)] = {std::cos(angle_rad), std::sin(angle_rad)};
-    }
-    return circle;
-  }();
+  constexpr double kDiagonal = 0.70710678118654752440;
+  static const std::array<Eigen::Vector2d, 8> kSamples = {Eigen::Vector2d(1.0, 0.0),
+                                                          {kDiagonal, kDiagonal},
+                                                          {0.0, 1.0},
+                                                          {-kDiagonal, kDiagonal},
+                                                          {-1.0, 0.0},
+                                                          {-kDiagonal, -kDiagonal},
+                                                          {0.0, -1.0},
+                                                          {kDiagonal, -kDiagonal}};
   const OnCircle squared_residual(form);
-  std::array<double, kSamples> value{};
-  for (std::size_t i = 0; i < kSamples; ++i) value[i] = squared_residual.At(kCircle[i]);
+  const Eigen::Vector2d* best = &kSamples[0];
+  for (const Eigen::Vector2d& sample : kSamples) {
+    if (squared_residual.At(sample) < squared_residual.At(*best)) best = &sample;
+  }
   FixedVector<Eigen::Vector2d, 2> minima;
-  for (std::size_t i = 0; i < kSamples && !minima.full(); ++i) {
-    const double before = value[(i + kSamples - 1) % kSamples];
-    const double after = value[(i + 1) % kSamples];
-    if (value[i] < before && value[i] <= after) {
-      minima.push_back(squared_residual.Minimum(kCircle[i]));
-    }
+  const Eigen::Vector2d first = squared_residual.Minimum(*best);
+  if (!first.allFinite()) return minima;
+  minima.push_back(first);
+
+  const OnCircle seen = squared_residual.SeenFrom(first);
+  double c3 = 2.0 * seen.b2;
+  double c2 = 4.0 * seen.a2 - seen.a1;
+  double c1 = -6.0 * seen.b2;
+  double c0 = -(seen.a1 + 4.0 * seen.a2);
+  const bool is_inverse = std::abs(c3) < std::abs(c0);
+  if (is_inverse) {
+    std::swap(c3, c0);
+    std::swap(c2, c1);
+  }
+  if (c3 == 0.0) return minima;
+  for (const double root : CubicRoots(c3, c2, c1, c0)) {
+    const Eigen::Vector2d half =
+        (is_inverse ? Eigen::Vector2d(root, 1.0) : Eigen::Vector2d(1.0, root)).normalized();
+    const double cos_k = half.x() * half.x() - half.y() * half.y();
+    const double sin_k = 2.0 * half.x() * half.y();
+    const Eigen::Vector2d v(first.x() * cos_k - first.y() * sin_k,
+                            first.y() * cos_k + first.x() * sin_k);
+    if (minima.full() || !(squared_residual.Bend(v) > 0.0)) continue;
+    minima.push_back(squared_residual.Minimum(v));
   }
   if (minima.size() == 2 && squared_residual.At(minima[1]) < squared_residual.At(minima[0])) {
     std::swap(minima[0], minima[1]);
   }
   return minima;
+}
+
+// A second minimum that fits worse than the first by this many squared sigmas is not worth a look:
+// the solver's own chi2 would have to err by more than half of it.
+constexpr double kClearExcess = 60.0;
+
+// Expected square of one equation of Eq. 14 at a root: noise of the bearing times the depth, and of
+// the tilts times the LEDs' spread about their mean. Both are upper estimates.
+double SquaredNoise(const Levelled& levelled, const Eigen::Vector3d& v, double t3) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double sum_of_squares = 0.0;
+  for (int i = 0; i < levelled.count; ++i) {
+    const Eigen::Vector3d arm = levelled.leds[static_cast<std::size_t>(i)].turned * v;
+    mean += arm;
+    sum_of_squares += arm.squaredNorm();
+  }
+  mean /= levelled.count;
+  const double spread_squared = sum_of_squares / levelled.count - mean.squaredNorm();
+  const double by_seen = levelled.seen_sigma * (mean.z() + t3);
+  return by_seen * by_seen + levelled.tilt_sigma_rad * levelled.tilt_sigma_rad * spread_squared;
 }
 
 bool AllInFront(const Levelled& levelled, const Eigen::Vector3d& v, double t3) {
@@ -215,13 +301,18 @@ Result<StartPoses, PoseFailure> StartPose(const PoseProblem& problem) {
   const auto roots = is_pair ? RootsOfPair(levelled) : MinimaOnCircle(eliminated.form);
   if (roots.empty()) return Failure{PoseFailure::kNotObservable};
   StartPoses starts;
+  double best_misfit = 0.0;
   for (const Eigen::Vector2d& root : roots) {
     const Eigen::Vector3d v(root.x(), root.y(), 1.0);
     const Eigen::Vector3d t = eliminated.t_by_v * v;
     if (!AllInFront(levelled, v, t.z())) continue;
+    const double misfit = v.dot(eliminated.form * v);
+    const bool is_first = starts.camera_from_target.empty();
+    if (is_first) best_misfit = misfit;
+    const double excess = misfit - best_misfit;
+    if (!is_first && !is_pair && excess > kClearExcess * SquaredNoise(levelled, v, t.z())) break;
     const Eigen::Matrix3d rotation = RotationAt(levelled, root.x(), root.y());
     starts.camera_from_target.push_back({Eigen::Quaterniond(rotation).normalized(), t});
-    if (!is_pair) break;
   }
   if (starts.camera_from_target.empty()) return Failure{PoseFailure::kBehindCamera};
   return starts;
