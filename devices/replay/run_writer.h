@@ -68,7 +68,7 @@ class RunWriter {
   bool WantsNewRun();
 
   // Closes the open run and opens the next, named after `now`. `solver_state` is
-  // FrameSolver::SaveState() at this point, or empty. False when it could not: see status().
+  // FrameSolver::BeginRecord() at this point, or empty. False when it could not: see status().
   bool Begin(Timestamp now, std::string_view solver_state);
 
   void AddTilt(const TiltReading& reading);

@@ -173,7 +173,7 @@ void CameraBox::SolveReplay(const std::stop_token& stop) {
 
 void CameraBox::BeginRecordingIfDue() {
   if (!parts_.recorder || !parts_.recorder->WantsNewRun()) return;
-  parts_.recorder->Begin(clock_.Now(), solver_.SaveState());
+  parts_.recorder->Begin(clock_.Now(), solver_.BeginRecord());
   for (const TiltSensor sensor : {TiltSensor::kTarget, TiltSensor::kCamera}) {
     for (const TiltHistory::Entry& entry : solver_.tilt_history(sensor).entries()) {
       parts_.recorder->Add({entry.sensed_at, sensor, entry.inclination});
@@ -188,10 +188,29 @@ void CameraBox::SolveFrame(const OwnedFrame& frame, PoseReason image_fault) {
   if (input.image_fault == PoseReason::kNone) input.image = frame.frame.image;
   const FrameResult& result = solver_.Solve(input);
   health_.NotePose(result.status, result.reason);
+  ReportMounting(result);
   PublishResult(frame, result);
   ControlExposure(frame, result);
   if (parts_.recorder) parts_.recorder->Add(frame, image_fault);
   if (on_result_) on_result_(result);
+}
+
+// Once when it is found, once when a full window says it is gone.
+void CameraBox::ReportMounting(const FrameResult& result) {
+  const bool moved = result.mounting.moved();
+  if (moved == mounting_alarm_ || (!moved && !result.mounting.absolute)) return;
+  mounting_alarm_ = moved;
+  const auto& change = result.mounting.change;
+  const auto& offset = change && change->moved ? change : result.mounting.absolute;
+  health_.Raise("camera_box",
+                "mounting_moved",
+                dds::Severity::kAlarm,
+                moved,
+                fmt::format("an inclinometer's mounting {}: image and tilts differ by pitch {:.3f} "
+                            "and roll {:.3f} degree",
+                            moved ? "has moved" : "agrees again",
+                            RadToDeg(offset->pitch_rad),
+                            RadToDeg(offset->roll_rad)));
 }
 
 void CameraBox::PublishResult(const OwnedFrame& frame, const FrameResult& result) {

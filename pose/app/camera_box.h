@@ -66,6 +66,7 @@ class CameraBox {
   void SolveFrame(const OwnedFrame& frame, PoseReason image_fault);
   void BeginRecordingIfDue();
   void PublishTilt(TiltSensor sensor, const Result<TiltSample, InclinometerFailure>& sample);
+  void ReportMounting(const FrameResult& result);
   void PublishResult(const OwnedFrame& frame, const FrameResult& result);
   void ControlExposure(const OwnedFrame& frame, const FrameResult& result);
   FrameCounts Counts() const;
@@ -86,6 +87,7 @@ class CameraBox {
   TiltInbox::Readings readings_;
   ExposureControl exposure_control_;
   std::uint64_t pose_number_ = 0;
+  bool mounting_alarm_ = false;
 
   std::array<std::uint64_t, 2> tilt_number_{};  // each inclinometer thread's own
   std::mutex tilt_publish_mutex_;               // one type, one writer at a time

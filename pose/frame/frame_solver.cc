@@ -73,7 +73,8 @@ FrameSolver::FrameSolver(const Rig& rig,
       published_(published),
       finder_(FinderOptionsOf(rig)),
       target_history_(options.tilt),
-      camera_history_(options.tilt) {
+      camera_history_(options.tilt),
+      monitor_(rig, options.monitor) {
   TBM_CHECK(options.method != PoseMethod::kPublished || published != nullptr);
   TBM_CHECK(rig.points.size() <= PointResults::capacity());
 }
@@ -177,6 +178,7 @@ void FrameSolver::SolveAssigned(const Assignment& assignment,
   result.status = checked->status;
   result.reason = checked->reason;
   NameTiltFault(result);
+  WatchMountings(problem, result);
   Accept(result);
 }
 
@@ -206,6 +208,20 @@ void FrameSolver::NameTiltFault(FrameResult& result) const {
     result.status = PoseStatus::kDegraded;
     result.reason = tilt->fault;
     return;
+  }
+}
+
+// The alarm stands until a full window says otherwise.
+void FrameSolver::WatchMountings(const PoseProblem& problem, FrameResult& result) {
+  result.mounting = monitor_.Add(problem, *result.pose);
+  if (result.mounting.moved()) {
+    mounting_moved_ = true;
+  } else if (result.mounting.absolute) {
+    mounting_moved_ = false;
+  }
+  if (mounting_moved_ && result.status == PoseStatus::kOk) {
+    result.status = PoseStatus::kDegraded;
+    result.reason = PoseReason::kMountingMoved;
   }
 }
 

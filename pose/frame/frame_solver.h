@@ -14,6 +14,7 @@
 #include "pose/rig/rig.h"
 #include "pose/solve/integrity.h"
 #include "pose/solve/problem.h"
+#include "pose/solve/tilt_monitor.h"
 
 namespace tbm {
 
@@ -44,6 +45,7 @@ struct FrameResult {
   std::optional<TiltSensor> tilt_suspect;  // with kTiltDisagrees: whose reading jumped
   std::optional<CheckedPose> pose;         // present unless status is none
   PointResults points;                     // rig points in the rig's order; empty without a pose
+  TiltMonitorReport mounting;              // image against inclinometers over many frames
 };
 
 struct FrameSolverOptions {
@@ -58,6 +60,7 @@ struct FrameSolverOptions {
   SolveOptions solve;
   IntegrityOptions integrity;
   TiltHistoryOptions tilt;
+  TiltMonitorOptions monitor;
 };
 
 // From exposures and tilt readings to poses, one frame at a time: find, assign, solve, check. Holds
@@ -81,10 +84,12 @@ class FrameSolver {
   // The result stays valid until the next call.
   const FrameResult& Solve(const FrameInput& frame);
 
-  // What later frames depend on, as text that survives a file without losing a bit: a recording
-  // that starts in the middle of the day writes it down, so that its replay gives the same bits.
-  std::string SaveState() const;
-  // False (and nothing changed) when `state` was not written by SaveState.
+  // Makes this the point where a recording begins: gives what later frames depend on as text that
+  // survives a file without losing a bit, and forgets what is not in it (the mounting monitor's
+  // window, not its baseline). A solver that restores the text and gets the readings of both
+  // histories and all that comes later gives the same bits.
+  std::string BeginRecord();
+  // False (and nothing changed) when `state` was not written by BeginRecord.
   bool RestoreState(const std::string& state);
 
   const Rig& rig() const { return rig_; }
@@ -110,6 +115,7 @@ class FrameSolver {
   Result<CheckedPose, PoseReason> PublishedInstead(const PoseProblem& problem,
                                                    const CheckedPose& checked) const;
   void NameTiltFault(FrameResult& result) const;
+  void WatchMountings(const PoseProblem& problem, FrameResult& result);
   void Accept(const FrameResult& result);
   std::optional<PosePrior> PriorAt(Timestamp at) const;
   std::optional<TiltSensor> SuspectTilt(const FrameResult& result) const;
@@ -123,6 +129,8 @@ class FrameSolver {
   TiltHistory camera_history_;
   std::optional<Timestamp> last_sensed_at_;
   std::optional<AcceptedPose> accepted_;
+  TiltMonitor monitor_;
+  bool mounting_moved_ = false;
   FrameResult result_;
 };
 

@@ -74,10 +74,22 @@ TiltMonitor::TiltMonitor(const Rig& rig, const TiltMonitorOptions& options)
 
 void TiltMonitor::Restart() {
   seen_ = 0;
-  baseline_ = Mean{};
+  baseline_ = TiltBaseline{};
   baseline_windows_ = 0;
   baseline_complete_at_ = 0;
   report_ = TiltMonitorReport{};
+}
+
+std::optional<TiltBaseline> TiltMonitor::baseline() const {
+  if (baseline_windows_ < options_.baseline_windows) return std::nullopt;
+  return baseline_;
+}
+
+void TiltMonitor::Restart(const std::optional<TiltBaseline>& baseline) {
+  Restart();
+  if (!baseline) return;
+  baseline_ = *baseline;
+  baseline_windows_ = options_.baseline_windows;
 }
 
 // The tilt rows' residual less what the LEDs alone make of it: to first order the tilt residual at
@@ -173,7 +185,6 @@ void TiltMonitor::Learn(const Mean& mean) {
   baseline_.by_centres += share * (mean.by_centres - baseline_.by_centres);
   baseline_.covariance =
       (1.0 - share) * (1.0 - share) * baseline_.covariance + share * share * mean.covariance;
-  baseline_.frames += mean.frames;
   ++baseline_windows_;
   baseline_complete_at_ = seen_;
 }

@@ -36,6 +36,15 @@ struct MountingOffset {
   bool moved = false;
 };
 
+// What the monitor has learned as "not moved".
+struct TiltBaseline {
+  Eigen::Vector2d offset_rad = Eigen::Vector2d::Zero();  // pitch, roll
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  // [rad^2]
+  // How much an error of each LED's centre [px], in the order of the rig, moves the offset [rad].
+  Eigen::Matrix<double, 2, 2 * kMaxLeds> by_centres =
+      Eigen::Matrix<double, 2, 2 * kMaxLeds>::Zero();
+};
+
 struct TiltMonitorReport {
   int frames = 0;  // that counted in the window
   // Against the rig file. Its sigma holds all that the calibration declares, which does not average
@@ -64,10 +73,16 @@ class TiltMonitor {
   // part of the image.
   void Restart();
 
+  // What was learned; empty while it is being learned.
+  std::optional<TiltBaseline> baseline() const;
+
+  // Forgets the window, and takes `baseline` instead of learning one. Two monitors that were
+  // restarted with the same baseline and see the same frames say the same.
+  void Restart(const std::optional<TiltBaseline>& baseline);
+
  private:
   static constexpr int kCentreRows = 2 * kMaxLeds;
-  // How much an error of each LED's centre [px], in the order of the rig, moves the offset [rad].
-  using ByCentres = Eigen::Matrix<double, 2, kCentreRows>;
+  using ByCentres = decltype(TiltBaseline::by_centres);
 
   // (pitch, roll) of one frame.
   struct Sighting {
@@ -94,7 +109,7 @@ class TiltMonitor {
   std::vector<Sighting> window_;
   std::vector<double> scratch_;
   int seen_ = 0;
-  Mean baseline_;
+  TiltBaseline baseline_;
   int baseline_windows_ = 0;
   int baseline_complete_at_ = 0;
   TiltMonitorReport report_;

@@ -184,7 +184,7 @@ TEST(RecordedRuns, RestoredStateContinuesWithTheSameBits) {
   TiltFeed tilts(*run);
   for (std::size_t i = 0; i < run->frames.size(); ++i) {
     if (i == kCut) {
-      ASSERT_TRUE(late.RestoreState(early.SaveState()));
+      ASSERT_TRUE(late.RestoreState(early.BeginRecord()));
       for (const TiltSensor sensor : {TiltSensor::kTarget, TiltSensor::kCamera}) {
         for (const auto& entry : early.tilt_history(sensor).entries()) {
           late.AddTilt({entry.sensed_at, sensor, entry.inclination});
@@ -203,8 +203,8 @@ TEST(RecordedRuns, RestoredStateContinuesWithTheSameBits) {
               whole[i].pose->pose.camera_from_target.translation);
     EXPECT_EQ(result.points[0].bound_m, whole[i].points[0].bound_m);
   }
-  EXPECT_FALSE(late.RestoreState("tbm_solver_state 1 1"));
-  EXPECT_FALSE(late.RestoreState(early.SaveState() + "x"));
+  EXPECT_FALSE(late.RestoreState("tbm_solver_state 2 1"));
+  EXPECT_FALSE(late.RestoreState(early.BeginRecord() + "x"));
   EXPECT_FALSE(late.RestoreState(""));
 }
 

@@ -1,0 +1,242 @@
+// The processes as a user starts them: the simulated machine, the camera box, and a reader on DDS.
+// Everything on loopback, in a DDS domain of the test's own.
+#include <algorithm>
+#include <filesystem>
+#include <map>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "devices/replay/run_reader.h"
+#include "idl/cpp/subscriber.h"
+#include "tests/idl/dds_support.h"
+#include "tests/idl/process.h"
+#include "tests/support/recorded_run.h"
+#include "tests/support/temp_folder.h"
+
+namespace tbm {
+namespace {
+
+using dds::test::Eventually;
+using dds::test::Process;
+using ::testing::HasSubstr;
+using namespace std::chrono_literals;
+
+constexpr int kDomain = 150;
+
+std::string Replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+class WholeMachine : public ::testing::Test {
+ protected:
+  WholeMachine() {
+    const std::string example = TBM_SOURCE_DIR "/pose/app/example/";
+    std::string config = test::ReadText(example + "camera_box.yaml");
+    config = Replaced(config, "domain: 25", "domain: " + std::to_string(kDomain));
+    config = Replaced(config, "# folder: runs", "folder: runs");
+    config = Replaced(config, "address: 127.0.0.1", "address: 127.0.0.31");
+    config = Replaced(config, "port: tilt_target", "port: " + (folder_ / "tilt_target"));
+    config = Replaced(config, "port: tilt_camera", "port: " + (folder_ / "tilt_camera"));
+    test::WriteText(folder_ / "camera_box.yaml", config);
+    test::WriteText(folder_ / "rig.yaml", test::ReadText(example + "rig.yaml"));
+  }
+
+  std::unique_ptr<Process> StartSimulator() {
+    auto simulator = std::make_unique<Process>(std::vector<std::string>{TBM_SIM,
+                                                                        "--rig",
+                                                                        folder_ / "rig.yaml",
+                                                                        "--address",
+                                                                        "127.0.0.31",
+                                                                        "--rate",
+                                                                        "10",
+                                                                        "--target-port",
+                                                                        folder_ / "tilt_target",
+                                                                        "--camera-port",
+                                                                        folder_ / "tilt_camera",
+                                                                        "--truth",
+                                                                        folder_ / "truth.csv"});
+    EXPECT_TRUE(Eventually([&] { return simulator->HasLine("ready"); }, 10s))
+        << simulator->Output();
+    return simulator;
+  }
+  std::unique_ptr<Process> StartBox() {
+    return std::make_unique<Process>(
+        std::vector<std::string>{CAMERA_BOX, folder_ / "camera_box.yaml"});
+  }
+  std::string NewestRun() const {
+    std::vector<std::string> runs;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_ / "runs")) {
+      runs.push_back(entry.path());
+    }
+    std::sort(runs.begin(), runs.end());
+    return runs.empty() ? std::string() : runs.back();
+  }
+
+  test::TempFolder folder_;
+};
+
+// What a reader on DDS has seen.
+class Watcher {
+ public:
+  Watcher()
+      : participant_(Config()),
+        poses_(participant_,
+               [this](const dds::RelativePose& pose, const dds::SampleFacts&) {
+                 const std::lock_guard lock(mutex_);
+                 all_.push_back(pose);
+               }),
+        health_(participant_, [this](const dds::DeviceHealth& health, const dds::SampleFacts&) {
+          const std::lock_guard lock(mutex_);
+          states_[std::string(health.device_id.view())] = health.state;
+        }) {}
+
+  std::vector<dds::RelativePose> Poses() const {
+    const std::lock_guard lock(mutex_);
+    return all_;
+  }
+  std::size_t OkCount() const {
+    const std::lock_guard lock(mutex_);
+    return static_cast<std::size_t>(std::count_if(
+        all_.begin(), all_.end(), [](const auto& pose) { return pose.status == PoseStatus::kOk; }));
+  }
+  bool IsIn(const std::string& device, dds::DeviceState state) const {
+    const std::lock_guard lock(mutex_);
+    const auto known = states_.find(device);
+    return known != states_.end() && known->second == state;
+  }
+
+ private:
+  static dds::ParticipantConfig Config() {
+    dds::ParticipantConfig config;
+    config.domain_id = kDomain;
+    config.name = "whole_machine_test";
+    return config;
+  }
+  mutable std::mutex mutex_;
+  std::vector<dds::RelativePose> all_;
+  std::map<std::string, dds::DeviceState> states_;
+  dds::Participant participant_;
+  dds::Subscriber<dds::RelativePose> poses_;
+  dds::Subscriber<dds::DeviceHealth> health_;
+};
+
+TEST_F(WholeMachine, PosesOnDdsHoldAgainstTheSimulatorsTruth) {
+  Watcher watcher;
+  const auto simulator = StartSimulator();
+  const auto box = StartBox();
+  ASSERT_TRUE(Eventually([&] { return watcher.OkCount() >= 30; }, 20s)) << box->Output();
+  box->Signal(SIGTERM);
+  EXPECT_EQ(box->Wait(), 0) << box->Output();
+  simulator->Signal(SIGTERM);
+  EXPECT_EQ(simulator->Wait(), 0);
+
+  const auto truth = test::ReadTruth(folder_.path());
+  ASSERT_GT(truth.size(), 30u);
+  int compared = 0;
+  for (const dds::RelativePose& pose : watcher.Poses()) {
+    if (pose.status == PoseStatus::kNone) continue;
+    // Stamps differ by what the network takes; the target moves 1 mm in a second.
+    const auto nearest =
+        std::min_element(truth.begin(), truth.end(), [&](const auto& a, const auto& b) {
+          return std::abs(a.stamp_ns - pose.sensed_at.ns) <
+                 std::abs(b.stamp_ns - pose.sensed_at.ns);
+        });
+    ASSERT_LT(std::abs(nearest->stamp_ns - pose.sensed_at.ns), 60'000'000);
+    const double error_m =
+        (pose.points[0].p_in_camera - nearest->camera_from_target * Eigen::Vector3d(0.0, 0.0, -1.6))
+            .norm();
+    ASSERT_TRUE(pose.points[0].bound_m);
+    EXPECT_LT(error_m, *pose.points[0].bound_m);
+    EXPECT_LT(error_m, 0.004);
+    ++compared;
+  }
+  EXPECT_GE(compared, 30);
+}
+
+TEST_F(WholeMachine, ADeadMachineIsSaidAndARestartedOneIsFoundAgain) {
+  Watcher watcher;
+  auto simulator = StartSimulator();
+  const auto box = StartBox();
+  ASSERT_TRUE(Eventually([&] { return watcher.OkCount() >= 5; }, 20s)) << box->Output();
+
+  simulator->Signal(SIGKILL);
+  simulator->Wait();
+  for (const char* device : {"camera", "inclinometer_target", "inclinometer_camera"}) {
+    EXPECT_TRUE(Eventually([&] { return !watcher.IsIn(device, dds::DeviceState::kStreaming); }, 5s))
+        << device;
+  }
+  EXPECT_TRUE(Eventually(
+      [&] { return box->Output().find("code=no_pose active=true") != std::string::npos; }, 5s))
+      << box->Output();
+  const std::size_t before = watcher.OkCount();
+  simulator = StartSimulator();
+  EXPECT_TRUE(Eventually([&] { return watcher.OkCount() >= before + 5; }, 30s)) << box->Output();
+  EXPECT_TRUE(Eventually(
+      [&] { return box->Output().find("code=no_pose active=false") != std::string::npos; }, 5s));
+  box->Signal(SIGTERM);
+  EXPECT_EQ(box->Wait(), 0);
+}
+
+// Like a power cut for the process: what it had recorded solves with the very same program, and DDS
+// leaves nothing behind.
+TEST_F(WholeMachine, ABoxThatIsKilledLeavesAReadableRecordingAndNoSharedMemory) {
+  Watcher watcher;
+  const auto simulator = StartSimulator();
+  const auto box = StartBox();
+  ASSERT_TRUE(Eventually([&] { return watcher.OkCount() >= 30; }, 20s)) << box->Output();
+  box->Signal(SIGKILL);
+  box->Wait();
+
+  const std::string run = NewestRun();
+  ASSERT_FALSE(run.empty());
+  Process solve({TBM, "solve", run, "--out", folder_ / "poses.csv"});
+  EXPECT_EQ(solve.Wait(), 0) << solve.Output();
+  std::ifstream poses(folder_ / "poses.csv");
+  std::string line;
+  int ok = -1;  // the heading
+  while (std::getline(poses, line)) ok += ok < 0 || line.find(",ok,") != std::string::npos ? 1 : 0;
+  EXPECT_GE(ok, 20);
+  for (const auto& entry : std::filesystem::directory_iterator("/dev/shm")) {
+    EXPECT_THAT(entry.path().filename().string(), ::testing::Not(HasSubstr("fastrtps")));
+  }
+
+  // And the next one begins with the same recordings folder.
+  const auto next = StartBox();
+  const std::size_t before = watcher.OkCount();
+  EXPECT_TRUE(Eventually([&] { return watcher.OkCount() >= before + 5; }, 30s)) << next->Output();
+}
+
+TEST_F(WholeMachine, ABadConfigurationEndsWithCodeTwoAndSaysAllThatIsWrong) {
+  std::string config = test::ReadText(folder_ / "camera_box.yaml");
+  config = Replaced(config, "frame_rate_hz: 10", "frame_rate_hz: fast");
+  config = Replaced(config, "driver: modbus  ", "driver: modbux  ");
+  test::WriteText(folder_ / "camera_box.yaml", config);
+  const auto box = StartBox();
+  EXPECT_EQ(box->Wait(), 2);
+  ASSERT_TRUE(Eventually([&] { return box->LineCount() >= 2; }));
+  EXPECT_THAT(box->Output(), HasSubstr("camera.frame_rate_hz"));
+  EXPECT_THAT(box->Output(), HasSubstr("inclinometers.target.driver: 'modbux' is not one of"));
+}
+
+TEST_F(WholeMachine, AMissingRigFileEndsWithCodeTwo) {
+  std::filesystem::remove(folder_ / "rig.yaml");
+  const auto box = StartBox();
+  EXPECT_EQ(box->Wait(), 2);
+  EXPECT_TRUE(Eventually([&] { return box->Output().find("rig.yaml") != std::string::npos; }));
+}
+
+TEST_F(WholeMachine, WatchShowsLiveValuesInPlainLines) {
+  const auto simulator = StartSimulator();
+  const auto box = StartBox();
+  Process watch({TBM, "watch", "--domain", std::to_string(kDomain)});
+  EXPECT_TRUE(
+      Eventually([&] { return watch.Output().find("shield_head") != std::string::npos; }, 20s))
+      << watch.Output() << box->Output();
+  EXPECT_THAT(watch.Output(), HasSubstr("ok"));
+}
+
+}  // namespace
+}  // namespace tbm
