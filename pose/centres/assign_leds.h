@@ -11,13 +11,12 @@
 namespace tbm {
 
 enum class AssignFailure {
-  kTooFewCentres,  // fewer than two spots (fewer than three without tilts)
+  kTooFewCentres,  // fewer than two spots (fewer than three without sharp tilts)
   kNoMatch,        // no set of spots can be the target
-  kAmbiguous,      // a second assignment fits about as well
+  kAmbiguous,      // a second assignment fits about as well, or false spots might well fit as well
 };
 
-// What is known before looking. All of it optional except the tilts' role: with both tilts a pair
-// of spots decides (NOTES §1); without, a prior pose or three spots do.
+// Where the target may be before looking, for instance from the last frame.
 struct PosePrior {
   Rigid3 camera_from_target;
   // One sigma of where the target may be by now: the last pose's covariance grown by the motion the
@@ -27,22 +26,33 @@ struct PosePrior {
 
 struct AssignOptions {
   double gate_sigma = 4.0;      // a spot further from an LED's image is not that LED
-  double min_distance_m = 0.5;  // of any LED from the camera
+  double min_distance_m = 0.5;  // depth of any LED in front of the camera
   double max_distance_m = 20.0;
-  double ambiguous_chi2_per_dof = 4.0;  // second best closer than this (and as many LEDs): say so
+  // Another assignment of as many LEDs whose chi2 is larger by less than this, per degree of
+  // freedom of the better one, makes both ambiguous.
+  double ambiguous_chi2_per_dof = 4.0;
 };
 
 struct Assignment {
-  LedObservations leds;                    // one spot per LED at the most, one LED per spot
+  LedObservations leds;  // by rising LED index; one spot per LED, one LED per spot
   FixedVector<int, kMaxLeds> spot_of_led;  // parallel to leds: index into the centres
-  Rigid3 camera_from_target;               // the start pose that the winner gives
+  Rigid3 camera_from_target;               // a start pose from all of them
   bool used_prior =
-      false;  // the image alone was ambiguous (or had too little) and the prior decided
-  bool without_tilts = false;
+      false;  // the image alone was ambiguous, or had no sharp tilts, and the prior decided
+  bool without_tilts = false;  // a tilt was missing or without an up vector, or both were doubted
 };
 
-// Decides which spot is which LED. Never guesses: of two explanations that are about equally good
-// it reports kAmbiguous.
+// Decides which spot is which LED. Never guesses: of two explanations that are about equally good,
+// or of one that false spots could offer as well, it reports kAmbiguous.
+//
+// Needs: with both tilts, three LEDs when little else shines, four among 20 false spots; with a
+// prior, two. Two LEDs without a prior are always kAmbiguous (or kNoMatch): nothing checks them.
+// Without tilts, three LEDs with a prior, four or five without. Brightness, spread and elongation
+// of the spots are not used, except that the brightest spots are tried first.
+//
+// Work is bounded: pairs of LEDs are looked for among the 32 brightest spots, triples (without
+// tilts) among the 12 brightest; the rest may only join. No heap; 90 kB of stack at the most. The
+// order of the centres does not matter. Method, bounds and measured rates: pose/docs/which_led.md.
 Result<Assignment, AssignFailure> AssignLeds(const Rig& rig,
                                              const Centres& centres,
                                              const std::optional<TiltObservation>& target_tilt,
