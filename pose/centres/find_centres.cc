@@ -22,6 +22,8 @@ constexpr std::size_t kPiecesPerBlock = kBlockWidth / LevelMap::kPieceWidth;
 static_assert(kPiecesPerBlock == 4);
 constexpr std::size_t kMaxRuns = 32768;
 constexpr std::size_t kMaxNeighbours = 8;
+constexpr int kMaxRounds = 10;       // of correcting neighbours for each other's light
+constexpr double kSettledPx = 5e-4;  // a round that moves nothing further is the last
 
 // What rises less than this above its surroundings is no lamp: pipes, wet walls.
 constexpr double kLowestOffset = 1.0 / 28.0;  // of full scale
@@ -34,8 +36,20 @@ constexpr double kLargestMisfit = 0.3;
 struct Candidate {
   SpotGuess guess;
   SpotFit fit;
-  bool measured = false;
+  bool failed = false;
+  double moved_px = 0.0;  // in the last round, when the neighbours' light was corrected
+  double left_px = 0.0;   // to go, if the rounds went on to shrink as the last two did
+  double overlap = 0.0;   // of the neighbours' light, see Overlap
 };
+
+SpotFit AsFit(const SpotGuess& guess) {
+  SpotFit fit;
+  fit.u_px = guess.u_px;
+  fit.v_px = guess.v_px;
+  fit.amplitude_dn = guess.amplitude_dn;
+  fit.sigma_u_px = fit.sigma_v_px = guess.spread_px;
+  return fit;
+}
 
 bool Near(const SpotFit& a, const SpotFit& b) {
   const double reach =
@@ -70,6 +84,22 @@ bool StandsOut(const ImageView& image, const SpotGuess& guess, double lowest_con
   const double peak = std::min<double>(guess.background_dn + guess.amplitude_dn, image.max_value);
   const double contrast = peak - lowest;
   return contrast > lowest_contrast_dn && peak - highest_of_lower > 0.4 * contrast;
+}
+
+// How much more variance a centre has because the neighbours under it are only estimated: the
+// product of the two spots' derivatives, times four for amplitude and spread, which are less well
+// told apart than the places (measured: spots three sigmas apart have 1.5 times the sigma).
+double Overlap(const SpotFit& fit, std::span<const SpotFit* const> others) {
+  double overlap = 0.0;
+  const double spread2 = fit.sigma_u_px * fit.sigma_v_px;
+  for (const SpotFit* other : others) {
+    const double mean2 = 0.5 * (spread2 + other->sigma_u_px * other->sigma_v_px);
+    const double du = fit.u_px - other->u_px;
+    const double dv = fit.v_px - other->v_px;
+    const double apart2 = (du * du + dv * dv) / mean2;
+    overlap += 2.0 * apart2 * std::exp(-0.25 * apart2);
+  }
+  return overlap;
 }
 
 // Difference of the two axes' second moments and twice the mixed moment: what has a direction.
@@ -114,8 +144,8 @@ struct CentreFinder::WorkSpace {
   void ScanRow(const std::byte* row_start, int row, const ImageView& image);
   std::size_t CollectGuesses(const ImageView& image, const FinderOptions& options);
   void MeasureAll(const ImageView& image, const FinderOptions& options);
-  void MeasureNeighbours(const ImageView& image, const SensorNoise& noise);
-  void DropDoubles();
+  double MeasureRound(const ImageView& image, const SensorNoise& noise, bool first);
+  void DropDoubles(double closer_than_spreads);
   double MedianOfSorted();
   void EstimateGain(const FinderOptions& options, double full_dn);
   Stretch CommonStretch();
@@ -133,6 +163,7 @@ Result<const FoundCentres*, ImageFailure> CentreFinder::Find(const ImageView& im
   TBM_CHECK(image.width_px >= 0 && image.height_px >= 0 && image.max_value > 0);
   TBM_CHECK(image.stride_bytes >= std::ptrdiff_t{image.bytes_per_pixel} * image.width_px);
   WorkSpace& work = *work_;
+  work.bright_blocks.reserve(static_cast<std::size_t>(image.width_px / kBlockWidth + 1));
   work.found.centres.clear();
   work.found.levels = {};
   if (image.width_px == 0 || image.height_px == 0) return Failure{ImageFailure::kDark};
@@ -264,59 +295,69 @@ void CentreFinder::WorkSpace::MeasureAll(const ImageView& image, const FinderOpt
       ++found.levels.rejected_spots;
       continue;
     }
-    Candidate candidate;
-    candidate.guess = guess;
-    candidate.measured =
-        meter.Measure(image, guess, noise, {}, &candidate.fit) == SpotVerdict::kMeasured;
-    if (!candidate.measured) {
-      ++found.levels.rejected_spots;
-      continue;
-    }
-    candidates.push_back(candidate);
+    candidates.push_back({guess, AsFit(guess)});
   }
-  DropDoubles();
-  MeasureNeighbours(image, noise);
-  DropDoubles();
+  DropDoubles(1.2);
+  MeasureRound(image, noise, true);
+  DropDoubles(0.7);
+  for (int round = 0; round < kMaxRounds; ++round) {
+    if (MeasureRound(image, noise, false) < kSettledPx) break;
+  }
+  DropDoubles(0.7);
   EstimateGain(options, full_dn);
 }
 
 // Two guesses can lead to one spot; the later one goes.
-void CentreFinder::WorkSpace::DropDoubles() {
+void CentreFinder::WorkSpace::DropDoubles(double closer_than_spreads) {
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const SpotFit& a = candidates[i].fit;
     std::erase_if(candidates, [&](const Candidate& other) {
       const SpotFit& b = other.fit;
-      return &other > &candidates[i] && std::hypot(a.u_px - b.u_px, a.v_px - b.v_px) <
-                                            0.7 * std::min(a.sigma_u_px, b.sigma_u_px);
+      return &other > &candidates[i] &&
+             std::hypot(a.u_px - b.u_px, a.v_px - b.v_px) <
+                 closer_than_spreads * std::min(a.sigma_u_px, b.sigma_u_px);
     });
   }
 }
 
-// Spots in each other's windows are measured again, each without the other's light.
-void CentreFinder::WorkSpace::MeasureNeighbours(const ImageView& image, const SensorNoise& noise) {
-  for (int round = 0; round < 3; ++round) {
-    for (Candidate& candidate : candidates) {
-      std::array<const SpotFit*, kMaxNeighbours> others;
-      std::size_t count = 0;
-      for (const Candidate& other : candidates) {
-        if (&other == &candidate || count == kMaxNeighbours || !Near(candidate.fit, other.fit)) {
-          continue;
-        }
-        others[count++] = &other.fit;
-      }
-      if (count == 0) continue;
-      SpotGuess start = candidate.guess;
-      start.u_px = candidate.fit.u_px;
-      start.v_px = candidate.fit.v_px;
-      start.amplitude_dn = candidate.fit.amplitude_dn;
-      start.spread_px = std::sqrt(candidate.fit.sigma_u_px * candidate.fit.sigma_v_px);
-      SpotFit fit;
-      const auto neighbours = std::span(others).first(count);
-      if (meter.Measure(image, start, noise, neighbours, &fit) == SpotVerdict::kMeasured) {
-        candidate.fit = fit;
-      }
+// Each spot without the light of the others in its window, as far as they are known by now. The
+// first round measures all, further ones only those that have such neighbours. Returns the
+// longest way that any has moved [px].
+double CentreFinder::WorkSpace::MeasureRound(const ImageView& image,
+                                             const SensorNoise& noise,
+                                             bool first) {
+  double longest_px = 0.0;
+  for (Candidate& candidate : candidates) {
+    std::array<const SpotFit*, kMaxNeighbours> others;
+    std::size_t count = 0;
+    for (const Candidate& other : candidates) {
+      if (count == kMaxNeighbours) break;
+      if (&other == &candidate || other.failed || !Near(candidate.fit, other.fit)) continue;
+      others[count++] = &other.fit;
+    }
+    if (!first && count == 0) continue;
+    SpotGuess start = candidate.guess;
+    start.u_px = candidate.fit.u_px;
+    start.v_px = candidate.fit.v_px;
+    start.amplitude_dn = candidate.fit.amplitude_dn;
+    start.spread_px = std::sqrt(candidate.fit.sigma_u_px * candidate.fit.sigma_v_px);
+    SpotFit fit;
+    const auto neighbours = std::span(others).first(count);
+    if (meter.Measure(image, start, noise, neighbours, &fit) == SpotVerdict::kMeasured) {
+      const double moved_px = std::hypot(fit.u_px - start.u_px, fit.v_px - start.v_px);
+      const double rate = std::clamp(moved_px / std::max(candidate.moved_px, 1e-9), 0.5, 0.95);
+      candidate.left_px = first ? 0.0 : moved_px * rate / (1.0 - rate);
+      candidate.moved_px = moved_px;
+      candidate.overlap = Overlap(fit, neighbours);
+      longest_px = std::max(longest_px, moved_px);
+      candidate.fit = fit;
+    } else {
+      candidate.failed = first;
     }
   }
+  const auto failed = std::erase_if(candidates, [](const Candidate& c) { return c.failed; });
+  found.levels.rejected_spots += static_cast<int>(failed);
+  return longest_px;
 }
 
 double CentreFinder::WorkSpace::MedianOfSorted() {
@@ -389,8 +430,8 @@ void CentreFinder::WorkSpace::Report(const FinderOptions& options) {
         std::hypot(own.along_px2 - common.along_px2, own.across_px2 - common.across_px2);
     const double beyond = std::min(beyond_round, beyond_rest);
     const double double_variance = beyond > 0.3 * spread * spread ? beyond : 0.0;
-    const double noise_variance = 0.5 * (fit.by_dark_u_px2 + fit.by_dark_v_px2) +
-                                  0.5 * gain * (fit.by_gain_u_px2 + fit.by_gain_v_px2);
+    double noise_variance = 0.5 * (fit.by_dark_u_px2 + fit.by_dark_v_px2) +
+                            0.5 * gain * (fit.by_gain_u_px2 + fit.by_gain_v_px2);
     // A step of the background under the spot pulls the centre by about its height by the spot's,
     // in spreads, and the height is about twice the RMS; the same goes for light that has another
     // shape than the model.
@@ -398,6 +439,9 @@ void CentreFinder::WorkSpace::Report(const FinderOptions& options) {
     const double structure_variance = share * share * spread * spread;
     Centre centre;
     centre.pixel_px = {fit.u_px, fit.v_px};
+    const double unsettled_px = candidates[i].left_px;
+    noise_variance *= 1.0 + candidates[i].overlap;
+    noise_variance += unsettled_px * unsettled_px;
     centre.sigma_px = std::sqrt(noise_variance + structure_variance + double_variance);
     centre.peak_dn = fit.amplitude_dn;
     centre.background_dn = fit.background_dn;

@@ -30,13 +30,15 @@ bool LooksLikeOneSpot(const RaisedBlob& raised,
   return share > 0.75 && share < 1.33;
 }
 
-// The next higher cut, by one grey value at least; 0 when the top is reached. By octaves through
-// the skirt, then at shares of the peak: two equal spots of sigma s part at 0.87 of the peak when
-// they are 2.4 s apart.
+// The next higher cut, by one grey value at least; 0 when the top is reached. In steps fine enough
+// that one falls between a spot of half the brightness and the saddle to its neighbour 3.4 sigmas
+// away; two equal spots part at 0.87 of the peak when they are 2.4 sigmas apart.
 double NextOffset(const RaisedBlob& raised) {
   const double amplitude_dn = raised.blob.peak_dn - raised.background_dn;
-  if (2.0 * raised.offset_dn < 0.25 * amplitude_dn) return 2.0 * raised.offset_dn;
-  for (const double share : {0.25, 0.5, 0.72, 0.87}) {
+  if (1.5 * raised.offset_dn < 0.22 * amplitude_dn) {
+    return std::max(1.5 * raised.offset_dn, raised.offset_dn + 1.0);
+  }
+  for (const double share : {0.22, 0.28, 0.35, 0.43, 0.52, 0.62, 0.74, 0.87}) {
     if (share * amplitude_dn > 1.05 * raised.offset_dn + 1.0) return share * amplitude_dn;
   }
   return 0.0;
