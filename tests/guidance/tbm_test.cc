@@ -1,0 +1,288 @@
+// The program itself, as a shell sees it.
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <Eigen/Core>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <pty.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "tests/support/temp_folder.h"
+
+namespace tbm {
+namespace {
+
+namespace fs = std::filesystem;
+using test::ReadText;
+using test::TempFolder;
+using test::WriteText;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+const std::string kRun = TBM_SOURCE_DIR "/tests/data/run_small";
+constexpr const char* kPoseHeader =
+    "stamp_ns,status,reason,leds_used,qw,qx,qy,qz,tx_mm,ty_mm,tz_mm,sigma_rot_x_deg,sigma_rot_y_"
+    "deg,"
+    "sigma_rot_z_deg,sigma_tx_mm,sigma_ty_mm,sigma_tz_mm,rms_px,shield_head_x_mm,shield_head_y_mm,"
+    "shield_head_z_mm,shield_head_sigma_mm,shield_head_bound_mm";
+
+class Tbm : public ::testing::Test {
+ protected:
+  int Run(const std::string& arguments) {
+    const std::string command = "'" TBM_PROGRAM "' " + arguments + " >'" + (folder_ / "stdout") +
+                                "' 2>'" + (folder_ / "stderr") + "'";
+    const int status = std::system(command.c_str());
+    out_ = ReadText(folder_ / "stdout");
+    err_ = ReadText(folder_ / "stderr");
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  std::string Path(std::string_view name) const { return folder_ / name; }
+
+  // A copy of the small run that a test may spoil.
+  std::string CopiedRun() {
+    fs::copy(kRun, Path("run"), fs::copy_options::recursive);
+    return Path("run");
+  }
+
+  TempFolder folder_;
+  std::string out_;
+  std::string err_;
+};
+
+std::vector<std::vector<std::string>> Rows(const std::string& csv) {
+  std::vector<std::vector<std::string>> rows;
+  std::istringstream lines(csv);
+  for (std::string line; std::getline(lines, line);) {
+    rows.emplace_back();
+    std::istringstream fields(line + ",");
+    for (std::string field; std::getline(fields, field, ',');) rows.back().push_back(field);
+  }
+  return rows;
+}
+
+TEST_F(Tbm, SolveWritesOneRowPerFrameWithExactlyThePromisedColumns) {
+  ASSERT_EQ(Run("solve " + kRun + " --out " + Path("p.csv")), 0) << err_;
+  const std::string csv = ReadText(Path("p.csv"));
+  EXPECT_EQ(csv.substr(0, csv.find('\n')), kPoseHeader);
+  const auto rows = Rows(csv);
+  const auto truth = Rows(ReadText(kRun + "/truth.csv"));
+  ASSERT_EQ(rows.size(), truth.size());
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    SCOPED_TRACE(i);
+    const std::string& note = truth[i].back();
+    ASSERT_EQ(rows[i].size(), 23u);
+    EXPECT_EQ(rows[i][0], truth[i][0]);
+    if (note == "missing_file") {
+      EXPECT_EQ(rows[i][1], "none");
+      EXPECT_EQ(rows[i][2], "frame_missing");
+      for (std::size_t column = 3; column < 23; ++column) EXPECT_EQ(rows[i][column], "");
+      continue;
+    }
+    EXPECT_EQ(rows[i][1], note == "ok" ? "ok" : "degraded");
+    EXPECT_EQ(rows[i][2], note == "ok" ? "" : "few_leds");
+    EXPECT_EQ(rows[i][3], note == "ok" ? "5" : "4");
+    const auto number = [](const std::string& text) { return std::stod(text); };
+    const Eigen::Vector3d head(number(rows[i][18]), number(rows[i][19]), number(rows[i][20]));
+    const Eigen::Vector3d true_head(number(truth[i][8]), number(truth[i][9]), number(truth[i][10]));
+    const double sigma_mm = number(rows[i][21]);
+    EXPECT_LT((head - true_head).norm(), number(rows[i][22])) << "inside its bound";
+    EXPECT_LT((head - true_head).norm(), 4.0 * sigma_mm);
+    EXPECT_LT(sigma_mm, 3.0);
+  }
+}
+
+TEST_F(Tbm, SolveGivesTheSameBytesWithAnyNumberOfThreads) {
+  ASSERT_EQ(Run("solve " + kRun + " --out " + Path("a.csv") + " --threads 1"), 0);
+  ASSERT_EQ(Run("solve " + kRun + " --out " + Path("b.csv") + " --threads 7"), 0);
+  EXPECT_EQ(ReadText(Path("a.csv")), ReadText(Path("b.csv")));
+}
+
+TEST_F(Tbm, JsonHoldsTheSameValuesAsCsv) {
+  ASSERT_EQ(Run("solve " + kRun + " --out " + Path("p.csv")), 0);
+  ASSERT_EQ(Run("solve " + kRun + " --out - --format json"), 0);
+  const auto rows = Rows(ReadText(Path("p.csv")));
+  const auto json = nlohmann::json::parse(out_);
+  ASSERT_EQ(json.size(), rows.size() - 1);
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    const auto& object = json[i - 1];
+    ASSERT_EQ(object.size(), rows[0].size());
+    EXPECT_EQ(std::to_string(object["stamp_ns"].get<std::int64_t>()), rows[i][0]);
+    EXPECT_EQ(object["reason"], rows[i][2]);
+    if (rows[i][8].empty()) {
+      EXPECT_TRUE(object["tx_mm"].is_null());
+    } else {
+      EXPECT_EQ(object["tx_mm"].get<double>(), std::stod(rows[i][8]));
+    }
+  }
+}
+
+TEST_F(Tbm, EveryMethodSolvesTheRun) {
+  for (const std::string method : {"fused", "published", "vision"}) {
+    ASSERT_EQ(Run("solve " + kRun + " --out " + Path(method) + " --method " + method), 0) << err_;
+    const std::string csv = ReadText(Path(method));
+    EXPECT_THAT(csv, HasSubstr(",ok,,5,")) << method;
+    EXPECT_THAT(csv, Not(HasSubstr("nan"))) << method;
+  }
+  EXPECT_NE(ReadText(Path("fused")), ReadText(Path("vision")));
+  EXPECT_NE(ReadText(Path("fused")), ReadText(Path("published")));
+}
+
+TEST_F(Tbm, CentresWritesOneRowPerSpotWithItsLed) {
+  ASSERT_EQ(Run("centres " + kRun + " --out " + Path("c.csv")), 0) << err_;
+  const auto rows = Rows(ReadText(Path("c.csv")));
+  EXPECT_EQ(rows[0],
+            (std::vector<std::string>{"stamp_ns", "led", "u_px", "v_px", "sigma_px", "peak"}));
+  EXPECT_EQ(rows.size(), 1u + 10u * 5u + 4u) << "ten frames of five LEDs, one of four, one missing";
+  std::array<int, 5> seen{};
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    ASSERT_EQ(rows[i].size(), 6u);
+    ASSERT_EQ(rows[i][1].size(), 2u) << "each spot is one of P1 .. P5";
+    ++seen[static_cast<std::size_t>(rows[i][1][1] - '1')];
+  }
+  EXPECT_EQ(seen, (std::array<int, 5>{11, 10, 11, 11, 11}));
+}
+
+TEST_F(Tbm, NothingIsWrittenOverAnExistingFileUnlessForced) {
+  WriteText(Path("p.csv"), "mine");
+  EXPECT_EQ(Run("solve " + kRun + " --out " + Path("p.csv")), 2);
+  EXPECT_THAT(err_, HasSubstr("exists already"));
+  EXPECT_EQ(ReadText(Path("p.csv")), "mine");
+  EXPECT_EQ(Run("solve " + kRun + " --out " + Path("p.csv") + " --force"), 0);
+  EXPECT_NE(ReadText(Path("p.csv")), "mine");
+}
+
+TEST_F(Tbm, WrongCommandLinesExitWithTwo) {
+  for (const std::string arguments : {"",
+                                      "dig",
+                                      "solve",
+                                      "solve " + kRun,
+                                      "solve " + kRun + " --out x --method guess",
+                                      "solve " + kRun + " --out x --format xml",
+                                      "check a b",
+                                      "completion fish",
+                                      std::string("solve /nowhere --out ") + "/tmp/never.csv"}) {
+    EXPECT_EQ(Run(arguments), 2) << arguments;
+    EXPECT_NE(err_, "") << arguments;
+  }
+}
+
+TEST_F(Tbm, ABadFileExitsWithTwoAndNamesItsLine) {
+  const std::string run = CopiedRun();
+  std::ofstream(run + "/tilt.csv", std::ios::app) << "1790000003000000000,target,abc,0.1\n";
+  EXPECT_EQ(Run("solve " + run + " --out " + Path("p.csv")), 2);
+  EXPECT_THAT(err_, HasSubstr("tilt.csv:74: column beta_deg: 'abc' is not a number"));
+  EXPECT_FALSE(fs::exists(Path("p.csv")));
+}
+
+TEST_F(Tbm, HelpAndVersionExitWithZero) {
+  for (const std::string arguments :
+       {"--help", "solve --help", "centres --help", "check --help", "watch --help"}) {
+    EXPECT_EQ(Run(arguments), 0) << arguments;
+    EXPECT_THAT(out_, HasSubstr("Example")) << arguments;
+    EXPECT_EQ(err_, "");
+  }
+  EXPECT_EQ(Run("--version"), 0);
+  EXPECT_THAT(out_, ::testing::MatchesRegex("tbm [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+TEST_F(Tbm, APipeIsSilentAndATerminalSeesProgress) {
+  const std::string run = CopiedRun();
+  fs::copy_file(
+      run + "/frames/000007.png", run + "/frames/000008.png", fs::copy_options::overwrite_existing);
+  ASSERT_EQ(Run("solve " + run + " --out " + Path("p.csv")), 0);
+  EXPECT_EQ(out_, "");
+  EXPECT_EQ(err_, "");
+
+  int terminal = -1;
+  const pid_t child = forkpty(&terminal, nullptr, nullptr, nullptr);
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    execl(TBM_PROGRAM,
+          "tbm",
+          "solve",
+          run.c_str(),
+          "--out",
+          Path("q.csv").c_str(),
+          static_cast<char*>(nullptr));
+    _exit(127);
+  }
+  std::string seen;
+  std::array<char, 4096> piece{};
+  for (ssize_t count = 0; (count = read(terminal, piece.data(), piece.size())) > 0;) {
+    seen.append(piece.data(), static_cast<std::size_t>(count));
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  close(terminal);
+  EXPECT_EQ(status, 0);
+  EXPECT_THAT(seen, HasSubstr("solving ["));
+  EXPECT_THAT(seen, HasSubstr("12 frames"));
+  EXPECT_EQ(ReadText(Path("p.csv")), ReadText(Path("q.csv")));
+}
+
+// Whenever it is killed, the output is not there or whole.
+TEST_F(Tbm, KilledAtAnyTimeItLeavesNoHalfFile) {
+  ASSERT_EQ(Run("solve " + kRun + " --out " + Path("whole.csv")), 0);
+  const std::string whole = ReadText(Path("whole.csv"));
+  const std::string out = Path("p.csv");
+  int finished = 0;
+  for (int i = 0; i < 30; ++i) {
+    fs::remove(out);
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      // The complaint about the missing frame is not wanted among the test's own lines.
+      std::freopen("/dev/null", "w", stderr);
+      execl(TBM_PROGRAM,
+            "tbm",
+            "solve",
+            kRun.c_str(),
+            "--out",
+            out.c_str(),
+            static_cast<char*>(nullptr));
+      _exit(127);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(25 * i));
+    kill(child, SIGKILL);
+    int status = 0;
+    waitpid(child, &status, 0);
+    if (!fs::exists(out)) continue;
+    ++finished;
+    EXPECT_EQ(ReadText(out), whole);
+  }
+  SUCCEED() << finished << " of 30 had finished";
+}
+
+TEST_F(Tbm, CompletionKnowsCommandsOptionsAndChoices) {
+  ASSERT_EQ(Run("completion bash"), 0);
+  const std::string script = Path("tbm.bash");
+  WriteText(script, out_);
+  const auto complete = [&](const std::string& words, int index) {
+    const std::string command = "bash -c 'source " + script + "; COMP_WORDS=(" + words +
+                                "); COMP_CWORD=" + std::to_string(index) +
+                                "; compopt() { :; }; _tbm; echo \"${COMPREPLY[*]}\"' > '" +
+                                Path("reply") + "'";
+    EXPECT_EQ(std::system(command.c_str()), 0);
+    return ReadText(Path("reply"));
+  };
+  EXPECT_EQ(complete("tbm so", 1), "solve\n");
+  EXPECT_EQ(complete("tbm solve --met", 2), "--method\n");
+  EXPECT_EQ(complete("tbm solve --method v", 3), "vision\n");
+  EXPECT_EQ(complete("tbm completion z", 2), "zsh\n");
+  ASSERT_EQ(Run("completion zsh"), 0);
+  EXPECT_THAT(out_, HasSubstr("'--method[estimator]:value:(fused published vision)'"));
+}
+
+}  // namespace
+}  // namespace tbm
