@@ -134,13 +134,17 @@ TEST_F(Network, APulledCableIsReportedAndHealsWhenItIsBack) {
       << reader.Output() << writer.Output();
 }
 
-// Listens on the cable while two processes talk, and says how many packets were on it.
-int PacketsOnTheCable(const Namespace& machine, const std::string& interface) {
-  Process capture(machine.Command({"tcpdump", "-i", "cable", "-n", "-l", "--immediate-mode"}));
+// Listens on the cable while two processes talk, and says how many packets of a kind were on it.
+int PacketsOnTheCable(const Namespace& machine,
+                      const std::string& interface,
+                      const std::string& kind = "",
+                      const std::vector<std::string>& environment = {}) {
+  Process capture(
+      machine.Command({"tcpdump", "-i", "cable", "-n", "-l", "--immediate-mode", kind}));
   EXPECT_TRUE(Eventually([&] { return capture.HasLine("listening on cable"); }))
       << capture.Output();
-  Process reader(machine.Command({kPeer, "read", "143", interface}));
-  Process writer(machine.Command({kPeer, "write", "143", interface, "20"}));
+  Process reader(machine.Command({kPeer, "read", "143", interface}), environment);
+  Process writer(machine.Command({kPeer, "write", "143", interface, "20"}), environment);
   EXPECT_TRUE(Eventually([&] { return reader.HasLine("pose 60"); }, 10s)) << reader.Output();
   capture.Signal(SIGINT);
   capture.Wait();
@@ -157,7 +161,16 @@ TEST_F(Network, NothingLeavesTheMachineBeforeItsOwnerSaysSo) {
   ASSERT_TRUE(net.a.Ip("addr add 10.77.0.1/24 dev cable"));
   ASSERT_TRUE(net.a.Ip("route add default dev cable"));
   EXPECT_EQ(PacketsOnTheCable(net.a, "default"), 0);
-  EXPECT_GT(PacketsOnTheCable(net.a, "cable"), 0);  // the capture itself works
+  EXPECT_GT(PacketsOnTheCable(net.a, "cable", "multicast"), 0);  // the capture itself works
+}
+
+TEST_F(Network, WithPeersNoMulticastIsSent) {
+  if (!Shell("which tcpdump > /dev/null")) GTEST_SKIP() << "tcpdump is not installed";
+  const TwoMachines net;
+  ASSERT_TRUE(net.is_made);
+  ASSERT_TRUE(net.a.Ip("addr add 10.77.0.1/24 dev cable"));
+  EXPECT_EQ(PacketsOnTheCable(net.a, "cable", "udp and multicast", {"TBM_PEER_UNICAST=10.77.0.1"}),
+            0);
 }
 
 }  // namespace

@@ -4,7 +4,9 @@
 //   for ever idl_test_peer read DOMAIN INTERFACE              prints "pose N" or "health N" for
 //   each sample
 //
-// Both print "starts N" when DDS has begun the Nth time and one line per alarm.
+// INTERFACE is "default" for what the config says when nobody sets it. A variable
+// TBM_PEER_UNICAST=ADDRESS makes it look for others at that address alone. Both print "starts N"
+// when DDS has begun the Nth time and one line per alarm.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -65,6 +67,7 @@ int main(int argc, char** argv) {
   if (argc < (verb == "write" ? 5 : 4)) return 2;
   ParticipantConfig config = test::OnLoopback(std::atoi(argv[2]), "idl_test_peer");
   if (std::string(argv[3]) != "default") config.interfaces = {argv[3]};
+  if (const char* peer = std::getenv("TBM_PEER_UNICAST")) config.peers = {peer};
   Participant participant(config, [](const Alarm& alarm) {
     std::printf("alarm %s %s\n", std::string(AlarmCode(alarm.kind)).c_str(), alarm.text.c_str());
     std::fflush(stdout);

@@ -1,4 +1,7 @@
 // Two participants of one process on loopback. Every sample goes over UDP: participant.h.
+#include <memory>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "idl/cpp/publisher.h"
@@ -288,6 +291,21 @@ TEST(Queue, DropsTheOldestAndCounts) {
     EXPECT_EQ(pose.sample_number, i);
   }
   EXPECT_EQ(subscriber.counters().dropped, 5u);
+}
+
+// Six of them: without a raised range the fifth and sixth would never be asked.
+TEST(Unicast, FindsMoreThanFourParticipantsOnOnePeer) {
+  ParticipantConfig config = OnLoopback(114, "unicast");
+  config.peers = {"127.0.0.1"};
+  std::vector<std::unique_ptr<Participant>> participants;
+  std::vector<std::unique_ptr<Subscriber<RelativePose>>> subscribers;
+  for (int i = 0; i < 6; ++i) participants.push_back(std::make_unique<Participant>(config));
+  for (auto& participant : participants) {
+    subscribers.push_back(std::make_unique<Subscriber<RelativePose>>(*participant));
+  }
+  const Publisher<RelativePose> publisher(*participants.front());
+  EXPECT_TRUE(Eventually([&] { return publisher.matched_readers() == 6; }, 10s))
+      << publisher.matched_readers();
 }
 
 TEST(Config, NamesEveryWrongKeyAtOnce) {
