@@ -32,6 +32,7 @@ BcdFrameEmulator::BcdFrameEmulator(SerialSettings line,
 std::vector<BcdFrameEmulator::Unit> BcdFrameEmulator::MakeUnits(
     std::vector<EmulatedFrameTilt> tilts) {
   std::vector<Unit> units;
+  units.reserve(tilts.size());
   for (EmulatedFrameTilt& tilt : tilts) units.push_back({std::move(tilt), {}, std::nullopt});
   return units;
 }

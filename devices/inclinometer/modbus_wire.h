@@ -2,7 +2,7 @@
 
 #include "devices/inclinometer/tilt_wire.h"
 
-struct _modbus;
+struct _modbus;  // libmodbus' own name. NOLINT(bugprone-reserved-identifier)
 
 namespace tbm {
 

@@ -102,35 +102,38 @@ Result<TiltSample, InclinometerFailure> StreamedInclinometer::Read(SteadyTime de
 }
 
 // Frames that came in one piece cannot be told apart in time: only the newest has a known instant.
+// Damage is counted also when a good frame follows in the same piece.
 Result<std::optional<TiltSample>, InclinometerFailure> StreamedInclinometer::TakeNewest(
     std::span<const std::uint8_t> bytes) {
   const SteadyTime now = clock_.Steady();
   const Timestamp now_utc = clock_.Now();
-  const std::uint64_t wrong_before = decoder_.wrong_sums();
   std::optional<WireReading> newest;
-  std::optional<InclinometerFailure> failure;
+  std::optional<InclinometerFailure> damage;
+  const auto note = [&](InclinometerFailure failure) {
+    if (damage) life_.OnFailure(*damage);
+    damage = failure;
+  };
   for (const std::uint8_t byte : bytes) {
+    const std::uint64_t wrong_before = decoder_.wrong_sums();
     for (auto frame = decoder_.Push(byte); frame; frame = decoder_.Next()) {
-      if (frame->address != static_cast<std::uint8_t>(config_.address)) {
-        failure = InclinometerFailure::kOtherInstrument;
-        continue;
-      }
       const auto reading = ReadingFromFrame(family_, *frame, config_.swap_axes);
-      if (!reading && reading.error() == AngleFailure::kNotAngles) continue;
-      life_.OnRequest();
-      if (!reading) {
-        failure = InclinometerFailure::kGarbled;
-        continue;
+      if (frame->address != static_cast<std::uint8_t>(config_.address)) {
+        note(InclinometerFailure::kOtherInstrument);
+      } else if (reading) {
+        life_.OnRequest();
+        if (newest) life_.OnStale();
+        newest = reading.value();
+      } else if (reading.error() != AngleFailure::kNotAngles) {
+        note(InclinometerFailure::kGarbled);
       }
-      if (newest) life_.OnStale();
-      newest = reading.value();
     }
+    if (decoder_.wrong_sums() > wrong_before) note(InclinometerFailure::kGarbled);
   }
   if (!newest) {
-    if (decoder_.wrong_sums() > wrong_before) failure = InclinometerFailure::kGarbled;
-    if (failure) return Failure{*failure};
+    if (damage) return Failure{*damage};  // counted by the caller
     return std::optional<TiltSample>();
   }
+  if (damage) life_.OnFailure(*damage);
   if (const auto refused = gate_.Refuses(newest->raw, now)) return Failure{*refused};
   const Timestamp sensed_at =
       now_utc - config_.port.LineTime(newest->reply_characters) - config_.latency;

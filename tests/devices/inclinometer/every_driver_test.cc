@@ -194,7 +194,10 @@ TEST_P(EveryDriver, RefusesGarbageAndGoesOn) {
   }
   const InclinometerHealth health = driver_->Health();
   EXPECT_GE(health.counters.good, good_before + 20);
-  EXPECT_GE(health.counters.garbled + health.counters.no_reply + health.counters.implausible, 6u);
+  const auto refused =
+      health.counters.garbled + health.counters.no_reply + health.counters.implausible;
+  // A frame out of range that a good one follows in the same piece of a stream is never looked at.
+  EXPECT_GE(refused, GetParam().automatic ? 6u : 8u);
 }
 
 TEST_P(EveryDriver, SurvivesUnplugAndReplug) {
@@ -236,7 +239,7 @@ TEST_P(EveryDriver, SleepsWhileUnpluggedAndWhileSilent) {
       [[maybe_unused]] const auto sample = Read();
     }
     const double wall_s = std::chrono::duration<double>(steady_clock::now() - start).count();
-    // A driver that spins uses 0.7 and more; sleeping ones were seen at 0.001.
+    // A driver that spins uses 0.7 and more; sleeping ones were seen below 0.01.
     EXPECT_LT((ProcessorSeconds() - used_before) / wall_s, 0.1) << "unplugged: " << unplugged;
   }
 }

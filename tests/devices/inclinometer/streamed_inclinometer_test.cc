@@ -125,7 +125,10 @@ TEST_F(Streamed, ClosesOnHangUpAndWaitsBeforeItOpensAgain) {
   link_->hung_up = false;
   link_->open_failure = LinkFailure::kMissing;
   const auto start = clock_.Steady();
-  while (clock_.Steady() - start < 10s) EXPECT_FALSE(Read(20ms));
+  for (int calls = 0; clock_.Steady() - start < 10s; ++calls) {
+    ASSERT_LT(calls, 1000) << "spins";
+    EXPECT_FALSE(Read(20ms));
+  }
   EXPECT_NEAR(link_->opens, 101, 2);
 }
 
@@ -139,6 +142,19 @@ TEST_F(Streamed, CountsADamagedFrameAndGoesOn) {
   EXPECT_EQ(first.error(), InclinometerFailure::kGarbled);
   Arrive(10ms, Sent(1.5));
   EXPECT_TRUE(Read());
+  EXPECT_EQ(driver_->Health().counters.garbled, 1u);
+}
+
+TEST_F(Streamed, CountsDamageAlsoWhenAGoodFrameFollowsInOnePiece) {
+  EXPECT_FALSE(Read());
+  Bytes damaged = Sent(1.5);
+  damaged[7] ^= 2;
+  Arrive(10ms, damaged);
+  Arrive(10ms, damaged);
+  Arrive(10ms, Sent(1.5));
+  EXPECT_TRUE(Read());
+  EXPECT_EQ(driver_->Health().counters.garbled, 2u);
+  EXPECT_FALSE(driver_->Health().last_failure);
 }
 
 }  // namespace
