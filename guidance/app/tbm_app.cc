@@ -11,6 +11,7 @@
 #include "guidance/app/check_command.h"
 #include "guidance/app/completion.h"
 #include "guidance/app/solve_command.h"
+#include "guidance/app/study_command.h"
 #include "guidance/app/watch_command.h"
 
 namespace tbm {
@@ -90,6 +91,16 @@ constexpr const char* kCheckHelp =
     "  tbm check poses.csv station.gsi --point shield_head --align rigid --report report\n"
     "      writes report/check.csv, check.json and check.png";
 
+constexpr const char* kStudyHelp =
+    "Repeats the simulation of the pose paper's section 4.1 (its lens and LEDs, 4 m, 0.1 to 1 px) "
+    "with the\n"
+    "three estimators, and writes study.csv, study.txt, study_rmse.png and study_mean.png: the six "
+    "panels of\n"
+    "its Fig. 3 with the bound that no estimator can go below drawn in.\n"
+    "\n"
+    "Example\n"
+    "  tbm study published --out published_study";
+
 constexpr const char* kWatchHelp =
     "On a terminal: a screen that redraws itself, green ok, yellow degraded, red none. What is old "
     "stands\n"
@@ -107,11 +118,13 @@ struct Requests {
   SolveRequest solve;
   SolveRequest centres;
   CheckRequest check;
+  StudyRequest study;
   WatchRequest watch;
   std::string align = "none";
   std::string format = "csv";
   std::string method = "fused";
   std::string shell;
+  std::string study_name;
 };
 
 const std::map<std::string, PoseMethod> kMethods = {{"fused", PoseMethod::kFused},
@@ -173,6 +186,24 @@ CLI::App* AddCheck(CLI::App& app, Requests& requests) {
   return check;
 }
 
+CLI::App* AddStudy(CLI::App& app, Requests& requests) {
+  StudyRequest& request = requests.study;
+  CLI::App* study = app.add_subcommand("study", "Simulations that show what the estimators reach");
+  study->footer(kStudyHelp);
+  study->add_option("NAME", requests.study_name, "which study")
+      ->required()
+      ->check(CLI::IsMember({"published"}));
+  study->add_option("--out,-o", request.out, "folder for the results")->capture_default_str();
+  study->add_option("--draws", request.draws, "random poses at each noise level")
+      ->check(CLI::Range(10, 10'000'000))
+      ->capture_default_str();
+  study->add_option("--seed", request.seed, "of the random poses")->capture_default_str();
+  study->add_option("--threads", request.threads, "threads; 0: one per core")
+      ->check(CLI::Range(0, 256));
+  study->add_flag("--force,-f", request.force, "replace existing files");
+  return study;
+}
+
 CLI::App* AddWatch(CLI::App& app, Requests& requests) {
   WatchRequest& request = requests.watch;
   CLI::App* watch = app.add_subcommand("watch", "Live values of a running camera box");
@@ -208,6 +239,7 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   const CLI::App* solve = AddSolve(app, requests);
   const CLI::App* centres = AddCentres(app, requests);
   const CLI::App* check = AddCheck(app, requests);
+  const CLI::App* study = AddStudy(app, requests);
   const CLI::App* watch = AddWatch(app, requests);
   const CLI::App* completion = AddCompletion(app, requests);
 
@@ -225,6 +257,7 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   if (solve->parsed()) return RunSolve(requests.solve, console);
   if (centres->parsed()) return RunCentres(requests.centres, console);
   if (check->parsed()) return RunCheck(requests.check, console);
+  if (study->parsed()) return RunStudy(requests.study, console);
   if (watch->parsed()) return RunWatch(requests.watch, console);
   if (completion->parsed()) {
     console.out << (requests.shell == "bash" ? BashCompletion(app) : ZshCompletion(app));

@@ -163,15 +163,17 @@ TEST_F(Tbm, NothingIsWrittenOverAnExistingFileUnlessForced) {
 }
 
 TEST_F(Tbm, WrongCommandLinesExitWithTwo) {
-  for (const std::string arguments : {"",
-                                      "dig",
-                                      "solve",
-                                      "solve " + kRun,
-                                      "solve " + kRun + " --out x --method guess",
-                                      "solve " + kRun + " --out x --format xml",
-                                      "check a b",
-                                      "completion fish",
-                                      std::string("solve /nowhere --out ") + "/tmp/never.csv"}) {
+  const std::vector<std::string> wrong = {"",
+                                          "dig",
+                                          "solve",
+                                          "solve " + kRun,
+                                          "solve " + kRun + " --out x --method guess",
+                                          "solve " + kRun + " --out x --format xml",
+                                          "check a b",
+                                          "completion fish",
+                                          "study weather",
+                                          "solve /nowhere --out " + Path("never.csv")};
+  for (const std::string& arguments : wrong) {
     EXPECT_EQ(Run(arguments), 2) << arguments;
     EXPECT_NE(err_, "") << arguments;
   }
@@ -262,6 +264,30 @@ TEST_F(Tbm, KilledAtAnyTimeItLeavesNoHalfFile) {
     EXPECT_EQ(ReadText(out), whole);
   }
   SUCCEED() << finished << " of 30 had finished";
+}
+
+TEST_F(Tbm, TheStudyIsTheSameForAnyNumberOfThreadsAndShowsWhatTheTiltsBuy) {
+  const std::string quick = "study published --draws 200 --out ";
+  ASSERT_EQ(Run(quick + Path("a") + " --threads 1"), 0) << err_;
+  ASSERT_EQ(Run(quick + Path("b") + " --threads 3"), 0) << err_;
+  EXPECT_EQ(ReadText(Path("a/study.csv")), ReadText(Path("b/study.csv")));
+  for (const char* picture : {"a/study_rmse.png", "a/study_mean.png"}) {
+    EXPECT_THAT(ReadText(Path(picture)), ::testing::StartsWith("\x89PNG"));
+  }
+  const auto rows = Rows(ReadText(Path("a/study.csv")));
+  ASSERT_EQ(rows.size(), 1u + 3u * 10u);
+  EXPECT_EQ(rows[0][4], "roll_rmse_deg");
+  EXPECT_EQ(rows[0][8], "pitch_rmse_deg");
+  EXPECT_EQ(rows[0][9], "pitch_bound_deg");
+  for (std::size_t i = 1; i < rows.size(); i += 3) {
+    const double vision_deg = std::stod(rows[i][8]);
+    const double fused_deg = std::stod(rows[i + 2][8]);
+    EXPECT_EQ(rows[i][1], "vision");
+    EXPECT_EQ(rows[i + 2][1], "fused");
+    EXPECT_LT(fused_deg, 0.3 * vision_deg) << "pitch at " << rows[i][0] << " px";
+    EXPECT_NEAR(fused_deg / std::stod(rows[i + 2][9]), 1.0, 0.2) << "at its bound";
+  }
+  EXPECT_EQ(Run(quick + Path("a")), 2) << "not over existing results";
 }
 
 TEST_F(Tbm, CompletionKnowsCommandsOptionsAndChoices) {
