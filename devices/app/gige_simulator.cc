@@ -60,6 +60,11 @@ void WriteName(ArvFakeCamera* camera, guint32 address, const char* name) {
 }  // namespace
 
 struct GigeSimulator::Machinery {
+  struct Image {
+    std::vector<std::uint8_t> pixels;
+    std::int64_t end_ns = 0;  // of its exposure
+  };
+
   Machinery(const GigeSimulatorOptions& options_in,
             std::shared_ptr<const sim::World> world,
             const sim::ViewOptions& view_options,
@@ -67,8 +72,9 @@ struct GigeSimulator::Machinery {
       : options(options_in),
         view(std::move(world), view_options),
         on_shown(std::move(on_shown_in)),
-        ready(view.size_bytes()),
-        back(view.size_bytes()) {}
+        shown{std::vector<std::uint8_t>(view.size_bytes()), g_get_real_time() * 1000},
+        coming{shown},
+        back{shown} {}
 
   ~Machinery() {
     renderer = std::jthread();  // stops and joins
@@ -78,6 +84,7 @@ struct GigeSimulator::Machinery {
   void Configure() const;
   void RenderAhead(const std::stop_token& stop);
   void Fill(ArvBuffer* buffer);
+  bool ShowComing();
   guint32 Register(guint32 address) const {
     guint32 value = 0;
     arv_fake_camera_read_register(camera, address, &value);
@@ -92,9 +99,11 @@ struct GigeSimulator::Machinery {
   const guint64 powered_up_ns = static_cast<guint64>(g_get_real_time()) * 1000 - 1'000'000'000;
 
   std::mutex mutex;  // of all that follows
-  std::vector<std::uint8_t> ready;
-  std::vector<std::uint8_t> back;  // rendering thread's own between two swaps
-  bool is_fresh = false;
+  Image shown;       // by the last frame
+  Image coming;      // its exposure has not ended yet, or no frame has left since
+  Image back;        // rendering thread's own between two swaps
+  bool is_coming = false;
+  std::int64_t sent_end_ns = 0;
   std::uint64_t sent = 0;
   std::uint64_t late = 0;
 
@@ -135,28 +144,41 @@ void GigeSimulator::Machinery::RenderAhead(const std::stop_token& stop) {
     }
     last_end_ns = end_ns;
     const double exposure_us = Register(ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
-    const Shown shown{{end_ns - static_cast<std::int64_t>(500.0 * exposure_us)}, exposure_us};
-    view.Render(shown.sensed_at, shown.exposure_us, back.data());
+    const Shown now_shown{{end_ns - static_cast<std::int64_t>(500.0 * exposure_us)}, exposure_us};
+    view.Render(now_shown.sensed_at, now_shown.exposure_us, back.pixels.data());
+    back.end_ns = end_ns;
     {
       const std::lock_guard lock(mutex);
-      std::swap(ready, back);
-      is_fresh = true;
+      ShowComing();
+      std::swap(coming, back);
+      is_coming = true;
     }
-    if (on_shown) on_shown(shown);
+    if (on_shown) on_shown(now_shown);
   }
 }
 
+// A frame that leaves late must not show an exposure that has not ended yet: its stamp would lie in
+// the future, which no camera's does.
+bool GigeSimulator::Machinery::ShowComing() {
+  if (!is_coming || coming.end_ns > g_get_real_time() * 1000) return false;
+  std::swap(shown, coming);
+  is_coming = false;
+  return true;
+}
+
 void GigeSimulator::Machinery::Fill(ArvBuffer* buffer) {
+  const std::lock_guard lock(mutex);
   // Aravis knows the buffer's size only once it is filled, and hands it out as read-only although
   // this callback is there to write it.
   const std::size_t size = arv_fake_camera_get_payload(camera);
   auto* const bytes =
       static_cast<std::uint8_t*>(const_cast<void*>(arv_buffer_get_data(buffer, nullptr)));
-  // A camera counts from its own power-up and knows nothing of civil time.
-  arv_buffer_set_timestamp(buffer, arv_buffer_get_timestamp(buffer) - powered_up_ns);
-  const std::lock_guard lock(mutex);
-  std::memcpy(bytes, ready.data(), std::min(size, ready.size()));
-  if (!std::exchange(is_fresh, false)) ++late;
+  if (!ShowComing() && shown.end_ns == sent_end_ns) ++late;
+  sent_end_ns = shown.end_ns;
+  // The end of the image's exposure, however late this thread was woken. A camera counts from its
+  // own power-up and knows nothing of civil time.
+  arv_buffer_set_timestamp(buffer, static_cast<guint64>(shown.end_ns) - powered_up_ns);
+  std::memcpy(bytes, shown.pixels.data(), std::min(size, shown.pixels.size()));
   ++sent;
   if (!options.stamp_sequence || size < 8) return;
   std::memcpy(bytes, "TBM#", 4);
@@ -181,7 +203,10 @@ Result<std::unique_ptr<GigeSimulator>, std::string> GigeSimulator::Start(
     return Failure{fmt::format("--address {}: no interface of this computer has this address",
                                options.address)};
   }
-  machinery->camera = arv_gv_fake_camera_get_fake_camera(machinery->server);
+  {
+    const std::lock_guard lock(machinery->mutex);
+    machinery->camera = arv_gv_fake_camera_get_fake_camera(machinery->server);
+  }
   g_object_set(machinery->server, "gvsp-lost-ratio", options.lost_packet_ratio, nullptr);
   machinery->Configure();
   const auto fill = +[](ArvBuffer* buffer, void* self, guint32, guint32, ArvPixelFormat) {

@@ -31,7 +31,9 @@ struct Shown {
 // the image in a frame is of the exposure that ended there.
 //
 // A thread of its own renders ahead; the protocol's thread only copies a finished image, because it
-// also has to answer heartbeats. A frame for which no image is ready shows the one before.
+// also has to answer heartbeats. A frame for which no image is ready repeats the one before, with
+// its stamp. The first frame leaves as soon as the client starts, with an image up to one period
+// old.
 class GigeSimulator {
  public:
   // The message says what is wrong and what to do: the address may be unknown here, or its control

@@ -22,11 +22,11 @@ TEST(GigeCamera, StreamsWholeImagesInOrder) {
   for (int i = 0; i < 30; ++i) {
     const auto frame = NextFrame(*camera);
     ASSERT_TRUE(frame);
+    if (i == 0) continue;  // may be incomplete
+    EXPECT_TRUE(frame->complete());
     EXPECT_EQ(frame->image.width_px, 1280);
     EXPECT_EQ(frame->image.height_px, 1024);
     EXPECT_EQ(frame->image.max_value, 255u);
-    if (i == 0) continue;  // may be incomplete
-    EXPECT_TRUE(frame->complete());
     const auto sequence = SequenceOf(*frame);
     ASSERT_TRUE(sequence);
     if (!first_sequence) {
@@ -93,7 +93,7 @@ TEST(GigeCamera, LossIsCountedFromFrameIds) {
 }
 
 TEST(GigeCamera, OnePercentOfPacketsLostCostsNoImageWithResend) {
-  const auto simulator = StartSimulator(SmallWorld(1280, 1024));
+  const auto simulator = StartSimulator(SmallWorld(640, 512));
   GvProxy proxy(kProxyAddress, kCameraAddress, "GigeCamera.resend");
   CameraConfig config = GigeConfig(10.0, kProxyAddress);
   config.packet_size_bytes = 1400;
@@ -106,9 +106,9 @@ TEST(GigeCamera, OnePercentOfPacketsLostCostsNoImageWithResend) {
     ASSERT_TRUE(frame);
     if (frame->complete()) ++whole;
   }
-  EXPECT_GE(whole, 39);
-  EXPECT_GT(proxy.dropped(), 100u);
-  EXPECT_GT(camera->Health().resent_packets, 100u);
+  EXPECT_GE(whole, 39);  // 240 packets a frame: without resend four of forty
+  EXPECT_GT(proxy.dropped(), 50u);
+  EXPECT_GT(camera->Health().resent_packets, 50u);
 }
 
 TEST(GigeCamera, WithoutResendAnImageWithHolesIsFlagged) {
@@ -180,7 +180,9 @@ TEST(GigeCamera, TheExposureReachesTheCameraAndItsFrameSaysSo) {
   const auto long_frame = NextFrame(*camera);
   ASSERT_TRUE(long_frame);
   EXPECT_EQ(long_frame->exposure_us, 5000.0);
-  EXPECT_NEAR(MaxPixel(*long_frame), 160, 25);
+  const double long_peak_dn = MaxPixel(*long_frame);
+  EXPECT_GT(long_peak_dn, 130.0);
+  EXPECT_LT(long_peak_dn, 230.0);
 
   camera->RequestExposure(2000.0);
   std::optional<Frame> frame;
@@ -191,7 +193,7 @@ TEST(GigeCamera, TheExposureReachesTheCameraAndItsFrameSaysSo) {
   FramesFor(*camera, std::chrono::milliseconds(200));
   frame = NextFrame(*camera);
   ASSERT_TRUE(frame);
-  EXPECT_NEAR(MaxPixel(*frame), 65, 15);
+  EXPECT_NEAR(MaxPixel(*frame) / long_peak_dn, 0.4, 0.06);
   EXPECT_EQ(camera->Health().exposure_us, 2000.0);
 
   camera->RequestExposure(1e9);
@@ -208,7 +210,9 @@ TEST(GigeCamera, StampsAreTheMiddleOfTheExposureOnThisComputersClock) {
     const std::lock_guard lock(mutex);
     shown_ns.insert(shown.sensed_at.ns);
   });
-  const auto camera = MakeCamera(GigeConfig(20.0), kClock);
+  CameraConfig config = GigeConfig(20.0);
+  config.exposure_us = 40'000.0;
+  const auto camera = MakeCamera(config, kClock);
   std::vector<double> errors_ms;
   for (int i = 0; i < 60; ++i) {
     const auto frame = NextFrame(*camera);
@@ -222,8 +226,9 @@ TEST(GigeCamera, StampsAreTheMiddleOfTheExposureOnThisComputersClock) {
     errors_ms.push_back(static_cast<double>(nearest_ns) * 1e-6);
   }
   std::nth_element(errors_ms.begin(), errors_ms.begin() + 20, errors_ms.end());
-  // Half an exposure is 2.5 ms: a stamp of the exposure's end would show.
-  EXPECT_LT(errors_ms[20], 1.5);
+  // Half an exposure is 20 ms, and the nearest exposure of another frame 50 ms away: a stamp of the
+  // exposure's begin or end would show. What is left is this computer's delay in sending.
+  EXPECT_LT(errors_ms[20], 8.0);
 }
 
 }  // namespace
