@@ -35,13 +35,15 @@ inline bool AnyAbovePlain(
 }
 
 #if defined(__GNUC__)
-// kBlockWidth columns. The brightest pixels of vectors of 16 bytes (SSE2, NEON), four at a time to
-// hide the latency, and one comparison at the end.
-template <class Pixel>
+// `kColumns` columns, a multiple of 16. Vectors of 16 bytes (SSE2, NEON), up to four maxima at a
+// time to hide the latency, and one comparison at the end.
+template <class Pixel, int kColumns = kBlockWidth>
 inline bool AnyAbove(const std::byte* first, std::ptrdiff_t stride_bytes, int rows, int threshold) {
   using Vector [[gnu::vector_size(16)]] = Pixel;
   constexpr int kLanes = 16 / sizeof(Pixel);
-  constexpr int kVectors = kBlockWidth / kLanes;
+  constexpr int kVectors = kColumns / kLanes;
+  constexpr int kAtOnce = kVectors < 4 ? kVectors : 4;
+  static_assert(kColumns % 16 == 0 && kVectors % kAtOnce == 0);
   if (threshold < 0) return rows > 0;
   if (threshold >= std::numeric_limits<Pixel>::max()) return false;
   const auto load = [](const std::byte* at) {
@@ -53,8 +55,8 @@ inline bool AnyAbove(const std::byte* first, std::ptrdiff_t stride_bytes, int ro
   Vector best[4] = {};
   for (int row = 0; row < rows; ++row) {
     const std::byte* at = first + row * stride_bytes;
-    for (int i = 0; i < kVectors; i += 4) {
-      for (int j = 0; j < 4; ++j) best[j] = larger(best[j], load(at + 16 * (i + j)));
+    for (int i = 0; i < kVectors; i += kAtOnce) {
+      for (int j = 0; j < kAtOnce; ++j) best[j] = larger(best[j], load(at + 16 * (i + j)));
     }
   }
   const Vector brightest = larger(larger(best[0], best[1]), larger(best[2], best[3]));
@@ -65,9 +67,9 @@ inline bool AnyAbove(const std::byte* first, std::ptrdiff_t stride_bytes, int ro
   return (halves[0] | halves[1]) != 0;
 }
 #else
-template <class Pixel>
+template <class Pixel, int kColumns = kBlockWidth>
 inline bool AnyAbove(const std::byte* first, std::ptrdiff_t stride_bytes, int rows, int threshold) {
-  return AnyAbovePlain<Pixel>(first, stride_bytes, kBlockWidth, rows, threshold);
+  return AnyAbovePlain<Pixel>(first, stride_bytes, kColumns, rows, threshold);
 }
 #endif
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <span>
 #include <vector>
 
@@ -68,14 +67,21 @@ double PixelAt(const ImageView& image, double u_px, double v_px) {
 // A cheap look before the fit: on every line through a spot the light falls off to at least one
 // side. On a pipe, a cable or the wall it goes on to both.
 bool StandsOut(const ImageView& image, const SpotGuess& guess, double lowest_contrast_dn) {
-  constexpr int kLines = 8;
+  // Cosine and sine of eight directions, evenly over half a turn.
+  constexpr std::array<std::array<double, 2>, 8> kLines = {{{1.0, 0.0},
+                                                            {0.924, 0.383},
+                                                            {0.707, 0.707},
+                                                            {0.383, 0.924},
+                                                            {0.0, 1.0},
+                                                            {-0.383, 0.924},
+                                                            {-0.707, 0.707},
+                                                            {-0.924, 0.383}}};
   const double reach_px = 3.0 * guess.spread_px + 1.0;
   double lowest = image.max_value;
   double highest_of_lower = 0.0;
-  for (int i = 0; i < kLines; ++i) {
-    const double angle = i * std::numbers::pi / kLines;
-    const double du = reach_px * std::cos(angle);
-    const double dv = reach_px * std::sin(angle);
+  for (const auto& line : kLines) {
+    const double du = reach_px * line[0];
+    const double dv = reach_px * line[1];
     const double lower = std::min(PixelAt(image, guess.u_px + du, guess.v_px + dv),
                                   PixelAt(image, guess.u_px - du, guess.v_px - dv));
     lowest = std::min(lowest, lower);
@@ -238,16 +244,14 @@ template <class Pixel>
 void CentreFinder::WorkSpace::ScanRow(const std::byte* row_start, int row, const ImageView& image) {
   for (const std::size_t block : bright_blocks) {
     const int column = static_cast<int>(block) * kBlockWidth;
-    const int columns = std::min(kBlockWidth, image.width_px - column);
-    if (columns == kBlockWidth &&
-        !AnyAbove<Pixel>(row_start + column * int{sizeof(Pixel)}, 0, 1, lowest_threshold[block])) {
-      continue;
-    }
     for (std::size_t piece = 0; piece < kPiecesPerBlock; ++piece) {
-      const int begin = column + static_cast<int>(piece) * LevelMap::kPieceWidth;
-      const int end = std::min(begin + LevelMap::kPieceWidth, image.width_px);
-      labeller.Scan<Pixel>(
-          row_start, row, begin, end, thresholds[block * kPiecesPerBlock + piece], image.max_value);
+      constexpr int kPiece = LevelMap::kPieceWidth;
+      const int begin = column + static_cast<int>(piece) * kPiece;
+      const int end = std::min(begin + kPiece, image.width_px);
+      const int threshold = thresholds[block * kPiecesPerBlock + piece];
+      const std::byte* at = row_start + begin * int{sizeof(Pixel)};
+      if (end - begin == kPiece && !AnyAbove<Pixel, kPiece>(at, 0, 1, threshold)) continue;
+      labeller.Scan<Pixel>(row_start, row, begin, end, threshold, image.max_value);
     }
   }
 }

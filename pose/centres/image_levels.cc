@@ -56,19 +56,20 @@ void LevelMap::Sample(const ImageView& image) {
       const int x0 = tile_column * kTileSize;
       const int width = std::min(kTileSize, image.width_px - x0);
       std::array<int, kSamplesPerTile> sample;
-      for (int i = 0; i < kSamplesPerTile; ++i) {
-        const int row = i / 4;
+      for (int row = 0; row < 4; ++row) {
         // Each row of samples starts elsewhere, so that nothing periodic hides between them.
-        const int x = x0 + (8 * (i % 4) + 2 * row + 1) * width / 32;
-        const int y = y0 + (2 * row + 1) * height / 8;
-        const std::byte* at = first + y * image.stride_bytes + x * int{sizeof(Pixel)};
-        const int here = LoadPixel<Pixel>(at);
-        sample[static_cast<std::size_t>(i)] = here;
-        saturated += static_cast<std::uint32_t>(here) >= image.max_value;
-        // Every other sample will do for the noise: thousands of differences in a camera's image.
-        if (i % 2 == 0 && x + 1 < image.width_px) {
-          const int step = std::abs(LoadPixel<Pixel>(at + sizeof(Pixel)) - here);
-          ++difference_count_[static_cast<std::size_t>(std::min(step, top_bin))];
+        int x = x0 + (2 * row + 1) * width / 32;
+        const std::byte* line = first + (y0 + (2 * row + 1) * height / 8) * image.stride_bytes;
+        for (int i = 0; i < 4; ++i, x += width / 4) {
+          const std::byte* at = line + x * int{sizeof(Pixel)};
+          const int here = LoadPixel<Pixel>(at);
+          sample[static_cast<std::size_t>(4 * row + i)] = here;
+          saturated += static_cast<std::uint32_t>(here) >= image.max_value;
+          // Every other sample will do for the noise: thousands of differences in a camera's image.
+          if (i % 2 == 0 && x + 1 < image.width_px) {
+            const int step = std::abs(LoadPixel<Pixel>(at + sizeof(Pixel)) - here);
+            ++difference_count_[static_cast<std::size_t>(std::min(step, top_bin))];
+          }
         }
       }
       const auto low = [&sample](std::size_t row) {

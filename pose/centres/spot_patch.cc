@@ -80,8 +80,9 @@ void SpotPatch::RemoveLight(const SpotFit& other) {
 bool SpotPatch::FitBackground(double noise_dn, double u, double v) {
   u_ = u;
   v_ = v;
-  return PlaneThroughMedians(noise_dn) && RefinePlane(4.0 * noise_dn + 1.0) &&
-         RefinePlane(3.0 * std::sqrt(plane_.variance_dn2) + 0.5);
+  return PlaneThroughMedians(noise_dn) &&
+         RefinePlane(4.0 * noise_dn + 1.0, outer_.height() > 30 ? 2 : 1) &&
+         RefinePlane(3.0 * std::sqrt(plane_.variance_dn2) + 0.5, 1);
 }
 
 // The window has eight neighbours: sides and corners. Each gives the median of some of its pixels;
@@ -207,10 +208,10 @@ void SpotPatch::AddRow(int row, int first, int last, float limit, FrameSums* sum
   sums->pixels += last - first + 1;
 }
 
-bool SpotPatch::RefinePlane(double limit_dn) {
+bool SpotPatch::RefinePlane(double limit_dn, int every) {
   const auto limit = static_cast<float>(limit_dn);
   FrameSums sums;
-  for (int row = outer_.top; row <= outer_.bottom; ++row) {
+  for (int row = outer_.top; row <= outer_.bottom; row += every) {
     const bool beside = row >= inner_.top && row <= inner_.bottom;
     AddRow(row, outer_.left, beside ? inner_.left - 1 : outer_.right, limit, &sums);
     if (beside) AddRow(row, inner_.right + 1, outer_.right, limit, &sums);

@@ -67,7 +67,8 @@ class SpotPatch {
   template <class Pixel>
   int CopyPixels(const ImageView& image);
   bool PlaneThroughMedians(double noise_dn);
-  bool RefinePlane(double limit_dn);
+  // From every row, or every second: enough for a start.
+  bool RefinePlane(double limit_dn, int every);
   void AddRow(int row, int first, int last, float limit, FrameSums* sums) const;
 
   std::size_t OuterIndex(int row) const {

@@ -430,6 +430,8 @@ void CompareVectorWithPlain(Random& random) {
       EXPECT_EQ(AnyAbove<Pixel>(first, stride, rows, threshold),
                 AnyAbovePlain<Pixel>(first, stride, kBlockWidth, rows, threshold))
           << "threshold " << threshold << " brightest " << brightest;
+      EXPECT_EQ((AnyAbove<Pixel, 16>(first, stride, rows, threshold)),
+                AnyAbovePlain<Pixel>(first, stride, 16, rows, threshold));
     }
   }
 }
