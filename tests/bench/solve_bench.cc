@@ -3,8 +3,8 @@
 // medians.
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
+#include <ctime>
 #include <vector>
 
 #include <opencv2/calib3d.hpp>
@@ -62,10 +62,10 @@ double sink = 0.0;
 
 template <class Solve>
 double SecondsPerDraw(const Draws& draws, Solve solve) {
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();
   for (std::size_t i = 0; i < kDraws; ++i) sink += solve(i);
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-  return took.count() / static_cast<double>(draws.problems.size());
+  const auto took = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  return took / static_cast<double>(draws.problems.size());
 }
 
 double Median(std::vector<double> values) {
