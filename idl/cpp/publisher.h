@@ -27,10 +27,10 @@ struct PublisherCounters {
 // Writes one topic. Message is FrameFeatures, TiltReading, RelativePose, DeviceHealth or Event;
 // topic and QoS follow from it. One thread at a time writes; the others wait.
 //
-// Write keeps no reference and does not wait for readers. Our own part takes no heap after the first
-// sample. Fast DDS 2.9.1 makes and drops up to ten closures of 32 bytes in each call, whatever the sample
-// (measured in tests/idl/publisher_heap_test.cc): a thread that must not touch the heap hands its messages
-// to another one.
+// Write keeps no reference and does not wait for readers. Our own part takes no heap after the
+// first sample. Fast DDS 2.9.1 makes and drops up to ten closures of 32 bytes in each call,
+// whatever the sample (measured in tests/idl/publisher_heap_test.cc): a thread that must not touch
+// the heap hands its messages to another one.
 template <class Message>
 class Publisher {
  public:
