@@ -35,7 +35,8 @@ struct RecordedRun {
   // in the order of time. Angles as the instrument gave them, before the rig's `sign`; not finite
   // where it said nan or inf.
   std::vector<TiltReading> tilts;
-  std::string solver_state;  // of FrameSolver::BeginRecord at the start; empty when none was recorded
+  std::string
+      solver_state;  // of FrameSolver::BeginRecord at the start; empty when none was recorded
   std::vector<std::string> warnings;  // for the log: what was passed over and why
 };
 

@@ -111,9 +111,9 @@ TEST(WatchCommand, SaysWhenNobodyIsThere) {
   EXPECT_EQ(Watch(kEmptyDomain, 0.5).code, ExitCode::kDds);
 }
 
-TEST(WatchCommand, RefusesANetworkThatIsNone) {
+TEST(WatchCommand, RefusesAPeerThatIsNoAddress) {
   WatchRequest request;
-  request.interfaces = {"300.1.1.1"};
+  request.peers = {"300.1.1.1"};
   request.seconds = 0.1;
   std::ostringstream out;
   std::ostringstream err;
