@@ -185,6 +185,21 @@ TEST(ExposureControl, FindsTheTargetAgainWhateverTheSearchHadReached) {
   }
 }
 
+TEST(ExposureControl, TheSearchGoesRoundAllExposures) {
+  Scene scene;
+  Loop loop(scene, 5500.0, "ExposureControl.round");
+  loop.Hide(true);
+  double lowest_us = 1e9;
+  double highest_us = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    loop.Frame();
+    lowest_us = std::min(lowest_us, loop.exposure_us());
+    highest_us = std::max(highest_us, loop.exposure_us());
+  }
+  EXPECT_EQ(lowest_us, 20.0);
+  EXPECT_EQ(highest_us, 50'000.0);
+}
+
 TEST(ExposureControl, KeepsToItsLimits) {
   Scene dark;
   dark.brightness_dn_per_us = 0.001;

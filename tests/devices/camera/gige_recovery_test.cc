@@ -110,6 +110,24 @@ TEST(GigeCamera, ACameraThatDiesAndComesBackIsOpenedAgain) {
   EXPECT_EQ(camera->Health().reconnects, 1u);
 }
 
+// Its heartbeats are answered, so the library sees nothing wrong.
+TEST(GigeCamera, ACameraThatAnswersButSendsNoFramesIsOpenedAgain) {
+  const auto simulator = StartSimulator();
+  GvProxy proxy(kProxyAddress, kCameraAddress, "GigeCamera.mute");
+  const auto camera = MakeCamera(GigeConfig(20.0, kProxyAddress), kClock);
+  ASSERT_TRUE(NextFrame(*camera));
+  proxy.drop = 1.0;
+  std::string why_lost;
+  for (int i = 0; i < 100 && why_lost.empty(); ++i) {
+    const auto frame = camera->WaitFrame(milliseconds(100));
+    if (!frame && frame.error() == CameraFailure::kLost) why_lost = camera->Health().detail;
+  }
+  EXPECT_EQ(why_lost, "the camera answers but sends no frames");
+  proxy.drop = 0.0;
+  EXPECT_TRUE(NextFrame(*camera, seconds(20)));
+  EXPECT_GE(camera->Health().reconnects, 1u);
+}
+
 TEST(GigeCamera, WithoutACameraItSaysSoAndOpensOnceThereIsOne) {
   Program simulator;
   const auto camera = MakeCamera(GigeConfig(20.0), kClock);
