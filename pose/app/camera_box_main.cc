@@ -18,6 +18,7 @@
 #include "pose/app/box_config.h"
 #include "pose/app/camera_box.h"
 #include "pose/app/dds_sink.h"
+#include "pose/app/queued_sink.h"
 #include "pose/rig/rig_file.h"
 
 namespace tbm {
@@ -137,7 +138,8 @@ int Main(const std::string& config_file, bool check_only) {
                    category,
                    text);
       });
-  DdsSink sink(participant);
+  DdsSink dds_sink(participant);
+  QueuedSink sink(dds_sink);
   CameraBox box(*config,
                 loaded->rig,
                 HashOf(rig_yaml),

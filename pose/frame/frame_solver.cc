@@ -143,9 +143,9 @@ Result<Assignment, AssignFailure> FrameSolver::Assign(const FrameResult& result,
   // have one; the checks that follow then find the tilts at fault.
   if (!assignment && assignment.error() != AssignFailure::kTooFewCentres && target_tilt &&
       camera_tilt) {
-    auto without_tilts =
-        AssignLeds(rig_, result.centres, std::nullopt, std::nullopt, prior, options_.assign);
-    if (without_tilts && without_tilts->leds.size() >= 4) return without_tilts;
+    auto doubting = AssignLedsDoubtingTilts(
+        rig_, result.centres, *target_tilt, *camera_tilt, prior, options_.assign);
+    if (doubting && doubting->leds.size() >= 4) return doubting;
   }
   return assignment;
 }

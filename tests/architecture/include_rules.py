@@ -11,7 +11,7 @@ import re
 import sys
 import tempfile
 
-POSIX = {"fcntl.h", "poll.h", "termios.h", "unistd.h", "sys", "pty.h", "arpa", "netinet", "net", "ifaddrs.h"}
+POSIX = {"signal.h", "fcntl.h", "poll.h", "termios.h", "unistd.h", "sys", "pty.h", "arpa", "netinet", "net", "ifaddrs.h"}
 POSE = {"pose/base", "pose/geometry", "pose/rig/rig.h"}
 POSE_ALL = {"pose/base", "pose/geometry", "pose/rig", "pose/centres", "pose/solve", "pose/frame"}
 
@@ -23,10 +23,10 @@ ALLOWED = {
     "pose/solve": {"Eigen", *POSE, "ceres"},
     "pose/rig": {"Eigen", "pose/base", "pose/geometry", "yaml-cpp", "fmt"},
     "pose/frame": {"Eigen", *POSE, "pose/centres", "pose/solve"},
-    "pose/app": {"Eigen", *POSE_ALL, "devices", "idl/cpp", "fmt", "CLI", "yaml-cpp", *POSIX},
-    "devices/bus": {"pose/base", *POSIX, "boost"},
+    "pose/app": {"Eigen", *POSE_ALL, "devices", "idl/cpp", "fmt", "CLI", "yaml-cpp", "openssl", *POSIX},
+    "devices/bus": {"pose/base", *POSIX},
     "devices/camera": {"Eigen", *POSE, "pose/centres", "devices/bus", "devices/sim", "devices/replay", "arv.h", "fmt", *POSIX},
-    "devices/inclinometer": {"pose/base", "pose/geometry", "devices/bus", "devices/sim", "modbus", "boost", "fmt", *POSIX},
+    "devices/inclinometer": {"pose/base", "pose/geometry", "devices/bus", "devices/sim", "modbus", "fmt", *POSIX},
     "devices/replay": {"Eigen", *POSE_ALL, "png.h", "tiffio.h", "fmt", *POSIX},
     "devices/sim": {"Eigen", *POSE, "pose/centres/image_view.h"},
     "devices/app": {"Eigen", *POSE_ALL, "devices", "fmt", "CLI", "yaml-cpp", *POSIX, "arv.h"},

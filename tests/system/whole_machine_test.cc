@@ -22,7 +22,7 @@ using dds::test::Process;
 using ::testing::HasSubstr;
 using namespace std::chrono_literals;
 
-constexpr int kDomain = 150;
+constexpr int kDomain = 160;
 
 std::string Replaced(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
