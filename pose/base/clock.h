@@ -6,8 +6,8 @@
 
 namespace tbm {
 
-// The two clocks of a process, as one object that only the edges (app, devices, idl) hold. Computing
-// code receives instants as arguments. Tests hand in a fake that moves only when told.
+// The two clocks of a process, as one object that only the edges (app, devices, idl) hold.
+// Computing code receives instants as arguments. Tests hand in a fake that moves only when told.
 class Clock {
  public:
   virtual ~Clock() = default;
@@ -22,9 +22,9 @@ class Clock {
 class SystemClock final : public Clock {
  public:
   Timestamp Now() const override {
-    return {std::chrono::duration_cast<Duration>(
-                std::chrono::system_clock::now().time_since_epoch())
-                .count()};
+    return {
+        std::chrono::duration_cast<Duration>(std::chrono::system_clock::now().time_since_epoch())
+            .count()};
   }
   std::chrono::steady_clock::time_point Steady() const override {
     return std::chrono::steady_clock::now();

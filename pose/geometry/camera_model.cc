@@ -71,8 +71,8 @@ Result<NormalisedPoint, CameraModelFailure> NormalisedFromPixel(const CameraMode
   NormalisedPoint point = wanted;
   for (int iteration = 0; iteration < 30; ++iteration) {
     const Distorted distorted = Distort(camera, point);
-    // A lens maps its image plane without folding; where the polynomial folds it no longer describes
-    // the lens, and Newton would settle on a wrong branch.
+    // A lens maps its image plane without folding; where the polynomial folds it no longer
+    // describes the lens, and Newton would settle on a wrong branch.
     if (!(distorted.by_point.determinant() > 0.0) || !(distorted.by_point(0, 0) > 0.0)) {
       return Failure{CameraModelFailure::kBeyondLens};
     }

@@ -16,15 +16,15 @@ struct Inclination {
 };
 
 enum class TiltFailure {
-  kNotFinite,    // NaN or infinite: a dead channel
-  kOutOfRange,   // beyond +-90 degrees, or no unit vector has both elevations: wiring or scaling
+  kNotFinite,   // NaN or infinite: a dead channel
+  kOutOfRange,  // beyond +-90 degrees, or no unit vector has both elevations: wiring or scaling
 };
 
 // The direction against gravity in the housing's own frame, as a unit vector:
 //   up = (-sin beta, sin gamma, sqrt(1 - sin^2 beta - sin^2 gamma)),  up.z > 0.
-// This is the third row of R^b of the paper and needs neither its arcsin nor its arctan, which flips
-// by 180 degrees for a camera that looks along the tunnel (papers' Eq. 12). Meant for plates less
-// than 90 degrees off level, which holds for all that is bolted to a shield.
+// This is the third row of R^b of the paper and needs neither its arcsin nor its arctan, which
+// flips by 180 degrees for a camera that looks along the tunnel (papers' Eq. 12). Meant for plates
+// less than 90 degrees off level, which holds for all that is bolted to a shield.
 Result<Eigen::Vector3d, TiltFailure> UpInTilt(const Inclination& reading);
 
 // Derivative of UpInTilt by (beta, gamma). `reading` must have an up vector.

@@ -15,7 +15,7 @@ inline constexpr int kMinLeds = 3;
 inline constexpr int kMaxLeds = 32;  // what the fixed-size solver has room for
 
 struct Led {
-  std::string id;                                           // as painted on the board, "P1"
+  std::string id;                                             // as painted on the board, "P1"
   Eigen::Vector3d p_led_in_target = Eigen::Vector3d::Zero();  // [m]
   double sigma_m = 0.0;  // of each coordinate; does not average out from frame to frame
 };
@@ -38,14 +38,14 @@ struct NamedPoint {
 struct Rig {
   std::string name;
   CameraModel camera;
-  double calibration_residual_px = 0.0;                       // per axis, of each LED's centre
+  double calibration_residual_px = 0.0;                           // per axis, of each LED's centre
   Eigen::Vector4d intrinsics_sigma_px = Eigen::Vector4d::Zero();  // fx fy cx cy
-  std::optional<double> gain_dn_per_electron;                 // of the sensor; estimated when absent
+  std::optional<double> gain_dn_per_electron;  // of the sensor; estimated when absent
   std::optional<double> read_noise_dn;
-  std::vector<Led> leds;            // kMinLeds .. kMaxLeds
+  std::vector<Led> leds;  // kMinLeds .. kMaxLeds
   TiltMount target_tilt;
   TiltMount camera_tilt;
-  std::vector<NamedPoint> points;   // e.g. shield_head
+  std::vector<NamedPoint> points;  // e.g. shield_head
 };
 
 }  // namespace tbm

@@ -61,8 +61,8 @@ struct SolveOptions {
 struct PoseEstimate {
   Rigid3 camera_from_target;
   PoseCovariance covariance = PoseCovariance::Zero();
-  double chi2 = 0.0;  // of whitened residuals; NaN for methods without a noise model
-  int dof = 0;        // 2 LEDs + 2 tilts - 6; 0 when nothing is left over to check
+  double chi2 = 0.0;    // of whitened residuals; NaN for methods without a noise model
+  int dof = 0;          // 2 LEDs + 2 tilts - 6; 0 when nothing is left over to check
   double rms_px = 0.0;  // of LED residuals, per axis, unweighted
   int iterations = 0;
 };

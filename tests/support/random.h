@@ -46,7 +46,9 @@ class Random {
     return sigma * a * scale;
   }
   Eigen::Vector2d Normal2(double sigma = 1.0) { return {Normal(sigma), Normal(sigma)}; }
-  Eigen::Vector3d Normal3(double sigma = 1.0) { return {Normal(sigma), Normal(sigma), Normal(sigma)}; }
+  Eigen::Vector3d Normal3(double sigma = 1.0) {
+    return {Normal(sigma), Normal(sigma), Normal(sigma)};
+  }
 
   Eigen::Quaterniond Rotation() {
     Eigen::Quaterniond q(Normal(), Normal(), Normal(), Normal());

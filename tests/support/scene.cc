@@ -58,13 +58,15 @@ Truth DrawTruth(Random& random, const TruthRange& range) {
   const double a = range.relative_angle_rad;
   // The target faces the camera: its z axis points back, its y axis up, hence half a turn about x.
   const Eigen::Quaterniond facing(0.0, 1.0, 0.0, 0.0);
-  truth.camera_from_target.rotation = (Eigen::AngleAxisd(angle(a), Eigen::Vector3d::UnitZ()) *
-                                       Eigen::AngleAxisd(angle(a), Eigen::Vector3d::UnitY()) *
-                                       Eigen::AngleAxisd(angle(a), Eigen::Vector3d::UnitX()) * facing)
-                                          .normalized();
-  truth.camera_from_target.translation = {random.Uniform(-range.lateral_m, range.lateral_m),
-                                          random.Uniform(-range.lateral_m, range.lateral_m),
-                                          random.Uniform(range.distance_min_m, range.distance_max_m)};
+  truth.camera_from_target.rotation =
+      (Eigen::AngleAxisd(angle(a), Eigen::Vector3d::UnitZ()) *
+       Eigen::AngleAxisd(angle(a), Eigen::Vector3d::UnitY()) *
+       Eigen::AngleAxisd(angle(a), Eigen::Vector3d::UnitX()) * facing)
+          .normalized();
+  truth.camera_from_target.translation = {
+      random.Uniform(-range.lateral_m, range.lateral_m),
+      random.Uniform(-range.lateral_m, range.lateral_m),
+      random.Uniform(range.distance_min_m, range.distance_max_m)};
   truth.up_in_camera = Eigen::AngleAxisd(angle(range.camera_tilt_rad), Eigen::Vector3d::UnitZ()) *
                        Eigen::AngleAxisd(angle(range.camera_tilt_rad), Eigen::Vector3d::UnitX()) *
                        -Eigen::Vector3d::UnitY();
@@ -89,9 +91,9 @@ PoseProblem ExactProblem(const Rig& rig, const Truth& truth) {
   PoseProblem problem;
   problem.rig = &rig;
   for (std::size_t i = 0; i < rig.leds.size(); ++i) {
-    const Eigen::Vector3d p_in_camera = truth.camera_from_target.rotation.toRotationMatrix() *
-                                            rig.leds[i].p_led_in_target +
-                                        truth.camera_from_target.translation;
+    const Eigen::Vector3d p_in_camera =
+        truth.camera_from_target.rotation.toRotationMatrix() * rig.leds[i].p_led_in_target +
+        truth.camera_from_target.translation;
     problem.leds.push_back({static_cast<int>(i), ExactPixel(rig.camera, p_in_camera), 0.0});
   }
   const Eigen::Vector3d up_in_target =

@@ -6,9 +6,9 @@
 
 namespace tbm::test {
 
-// The rig of the pose paper's section 4.1: 16 mm lens, 5.3 um pixels, 1280 x 1024, no distortion, the
-// five LEDs of Table 1, tilt sigma 0.005 degree; inclinometers bolted level-ish: tilt z is up when the
-// camera looks along the tunnel and when the target's y is up. Nothing else is uncertain.
+// The rig of the pose paper's section 4.1: 16 mm lens, 5.3 um pixels, 1280 x 1024, no distortion,
+// the five LEDs of Table 1, tilt sigma 0.005 degree; inclinometers bolted level-ish: tilt z is up
+// when the camera looks along the tunnel and when the target's y is up. Nothing else is uncertain.
 Rig PublishedRig();
 
 // PublishedRig with lens distortion, unequal focal lengths, an off-centre principal point and
@@ -24,9 +24,9 @@ struct Truth {
 struct TruthRange {
   double distance_min_m = 4.0;
   double distance_max_m = 4.0;
-  double lateral_m = 0.2;             // +- of x and y
-  double relative_angle_rad = 0.03;   // +- of each axis, around the target facing the camera upright
-  double camera_tilt_rad = 0.05;      // +- roll and pitch of the camera against level
+  double lateral_m = 0.2;            // +- of x and y
+  double relative_angle_rad = 0.03;  // +- of each axis, around the target facing the camera upright
+  double camera_tilt_rad = 0.05;     // +- roll and pitch of the camera against level
 };
 
 Truth DrawTruth(Random& random, const TruthRange& range);
@@ -38,7 +38,10 @@ Inclination ExactInclination(const TiltMount& mount, const Eigen::Vector3d& up_i
 PoseProblem ExactProblem(const Rig& rig, const Truth& truth);  // all LEDs, both tilts, sigmas 0
 
 // Exact observations plus seeded noise; the sigmas in the problem say what was added.
-PoseProblem NoisyProblem(
-    const Rig& rig, const Truth& truth, double centre_sigma_px, double tilt_sigma_rad, Random& random);
+PoseProblem NoisyProblem(const Rig& rig,
+                         const Truth& truth,
+                         double centre_sigma_px,
+                         double tilt_sigma_rad,
+                         Random& random);
 
 }  // namespace tbm::test

@@ -132,8 +132,8 @@ TEST(SolveFused, CovarianceIsTheIndependentBound) {
   }
 }
 
-// Target straight ahead at 4 m, 0.1 px, 0.005 degree: worked out once from the independent bound. The
-// tilts buy a factor of five in pitch and more than two in roll; yaw they cannot help.
+// Target straight ahead at 4 m, 0.1 px, 0.005 degree: worked out once from the independent bound.
+// The tilts buy a factor of five in pitch and more than two in roll; yaw they cannot help.
 TEST(SolveFused, PredictsWhatTheGeometryAllows) {
   const Rig rig = PublishedRig();
   Truth truth;
