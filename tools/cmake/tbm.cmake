@@ -9,7 +9,7 @@ target_compile_options(tbm_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-restr
 # Fused multiply-add changes the last bit from machine to machine; a recording must replay bit for bit.
 target_compile_options(tbm_options INTERFACE -ffp-contract=off)
 if(TBM_SANITIZE)
-  target_compile_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE} -fno-omit-frame-pointer -g)
+  target_compile_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE})
 endif()
 
@@ -58,7 +58,7 @@ option(TBM_FUZZ "build the fuzz targets (clang with libFuzzer)" OFF)
 add_custom_target(fuzz_targets)
 if(TBM_FUZZ)
   target_compile_options(tbm_options INTERFACE
-    -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined -g)
+    -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined)
   target_link_options(tbm_options INTERFACE -fsanitize=address,undefined)
 endif()
 
