@@ -16,8 +16,8 @@ bool Brighter(const Centre& a, const Centre& b) {
 }
 
 bool IsUsable(const Centre& centre) {
-  return centre.pixel_px.allFinite() && std::isfinite(centre.peak_dn) &&
-         std::isfinite(centre.sigma_px) && centre.sigma_px >= 0.0;
+  return centre.sigma_px <= kLargestSigmaPx && centre.pixel_px.allFinite() &&
+         std::isfinite(centre.peak_dn) && std::isfinite(centre.sigma_px) && centre.sigma_px >= 0.0;
 }
 
 Spots SortedSpots(const Rig& rig, const Centres& centres) {

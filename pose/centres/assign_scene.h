@@ -57,6 +57,10 @@ struct Scene {
 // A centre better than this is not believed: below it lens and finder are never known.
 inline constexpr double kLeastSigmaPx = 0.03;
 
+// A spot worse than this says nothing about a pose, yet would fit beside nearly every LED: glare
+// that an LED stands in, two lamps run into one.
+inline constexpr double kLargestSigmaPx = 2.0;
+
 // One sigma of the angle between the two verticals, about any one axis [rad].
 double UpSigma(const UpPair& ups);
 
@@ -64,7 +68,8 @@ double UpSigma(const UpPair& ups);
 inline constexpr double kSharpUpSigmaRad = 0.01;
 
 // Spots outside the lens model, with a pixel or sigma that is not finite, or with a negative sigma
-// are left out. Tilts without an up vector and priors without an inverse count as absent.
+// are left out, and those worse than kLargestSigmaPx. Tilts without an up vector and priors without
+// an inverse count as absent.
 Scene MakeScene(const Rig& rig,
                 const Centres& centres,
                 const std::optional<TiltObservation>& target_tilt,

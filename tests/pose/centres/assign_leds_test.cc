@@ -196,6 +196,18 @@ TEST(AssignLeds, ATiltFourDegreesOffIsNeverBelievedAndTheRetryNamesTheLeds) {
   }
 }
 
+// Three that agree with the wrong tilt by chance are rare: hence many draws.
+TEST(AssignLeds, ThreeLedsThatAgreeWithAWrongTiltAreNotBelieved) {
+  Random random("assign_chance_three");
+  int wrong = 0;
+  for (int i = 0; i < 2500; ++i) {
+    Draw draw = DrawFrame(DeclaredRig(), Visible(4, 5, FalseSpots::kUniform, i % 2), random);
+    Disturb(draw, random.Uniform(1.0, 5.0), random);
+    wrong += AnswerTo(draw, Assign(DeclaredRig(), draw)) == Answer::kWrong;
+  }
+  EXPECT_EQ(wrong, 0);
+}
+
 Rig Board(int leds) {
   Rig rig = FieldRig();
   Random random("assign_board", static_cast<std::uint64_t>(leds));
@@ -281,6 +293,81 @@ TEST(AssignLeds, OneSpotPerLedAndOneLedPerSpot) {
         EXPECT_NE(result->spot_of_led[a], result->spot_of_led[b]);
       }
     }
+  }
+}
+
+// A rig whose principal point was never measured well: the verticals then turn with it.
+TEST(AssignLeds, APoorlyKnownPrincipalPointWidensTheGates) {
+  Random random("assign_principal_point");
+  Rig declared = FieldRig();
+  declared.intrinsics_sigma_px = {0.0, 0.0, 8.0, 8.0};
+  int right = 0;
+  for (int i = 0; i < 200; ++i) {
+    const Rig as_built = AsBuilt(declared, random);
+    const Draw draw = DrawFrame(as_built, Visible(5, 5, FalseSpots::kUniform, 2), random);
+    right += AnswerTo(draw, Assign(declared, draw)) == Answer::kRight;
+  }
+  EXPECT_GE(right, 198);
+}
+
+// Old spots that still look like the target where it was, beside the target where it is now.
+TEST(AssignLeds, FiveLedsOutweighAPriorThatThreeOldReflectionsSupport) {
+  Random random("assign_outweighs");
+  for (int i = 0; i < 100; ++i) {
+    Draw draw = DrawFrame(FieldRig(), WithPrior(Visible(5, 5, FalseSpots::kUniform, 0)), random);
+    draw.prior->camera_from_target = draw.truth.camera_from_target;
+    draw.prior->camera_from_target.translation += Eigen::Vector3d(0.12, -0.09, 0.5);
+    for (const int led : {0, 2, 4}) {
+      Centre old_spot = draw.centres[0];
+      old_spot.pixel_px =
+          ExactPixel(FieldRig().camera,
+                     draw.prior->camera_from_target *
+                         FieldRig().leds[static_cast<std::size_t>(led)].p_led_in_target);
+      draw.centres.push_back(old_spot);
+      draw.led_of_spot.push_back(-1);
+    }
+    const auto result = Assign(FieldRig(), draw);
+    ASSERT_EQ(AnswerTo(draw, result), Answer::kRight);
+    EXPECT_EQ(result->leds.size(), 5u);
+  }
+}
+
+// Two LEDs 3 mm apart and one of them dark: the other's spot lies in the gates of both.
+TEST(AssignLeds, TwoLedsNeverShareASpot) {
+  Rig rig = FieldRig();
+  rig.leds.push_back({"P6", rig.leds[0].p_led_in_target + Eigen::Vector3d(0.003, 0, 0), 0.0});
+  Random random("assign_shared");
+  for (int i = 0; i < 300; ++i) {
+    DrawOptions options = Visible(4, 5, FalseSpots::kUniform, 1);
+    options.centre_sigma_px = 1.0;
+    const auto result = Assign(rig, DrawFrame(rig, WithPrior(options), random));
+    if (!result) continue;
+    for (std::size_t a = 0; a < result->leds.size(); ++a) {
+      for (std::size_t b = 0; b < a; ++b) {
+        EXPECT_NE(result->spot_of_led[a], result->spot_of_led[b]);
+      }
+    }
+  }
+}
+
+// Seen on a recorded run: glare 15 px beside an LED, its own sigma 4 px, made the frame ambiguous.
+TEST(AssignLeds, GlareOfPixelsSigmaBesideAnLedIsNoRival) {
+  Random random("assign_glare");
+  for (int i = 0; i < 200; ++i) {
+    Draw draw = DrawFrame(DeclaredRig(), Visible(3, 5, FalseSpots::kUniform, 0), random);
+    const std::size_t leds = draw.centres.size();
+    for (std::size_t k = 0; k < leds; ++k) {
+      Centre glare = draw.centres[k];
+      glare.pixel_px += Eigen::Vector2d(-12.0, 7.0);
+      glare.sigma_px = 4.0;
+      draw.centres.push_back(glare);
+      draw.led_of_spot.push_back(-1);
+    }
+    const Answer answer = AnswerTo(draw, Assign(DeclaredRig(), draw));
+    Draw clean = draw;
+    clean.centres.resize(leds);
+    clean.led_of_spot.resize(leds);
+    ASSERT_EQ(answer, AnswerTo(clean, Assign(DeclaredRig(), clean))) << "draw " << i;
   }
 }
 

@@ -125,7 +125,7 @@ TEST(FrameSolver, NamesTheInclinometerThatJumped) {
 // 0.05 degree from the 260th frame on: no single frame shows it, the monitor does.
 TEST(FrameSolver, AMountingThatMovesDegradesThePoseWithin200Frames) {
   sim::Faults faults;
-  faults.tilts.push_back({sim::TiltSensor::kTarget, {DegToRad(0.05), 0.0}, {26.0, 1e9}});
+  faults.tilts.push_back({sim::TiltSensor::kTarget, {DegToRad(0.05), 0.0}, {26.05, 1e9}});
   Machine machine(faults);
   FrameSolver solver(machine.rig());
   int found_at = -1;
