@@ -37,7 +37,6 @@ class WholeMachine : public ::testing::Test {
     std::string config = test::ReadText(example + "camera_box.yaml");
     config = Replaced(config, "domain: 25", "domain: " + std::to_string(kDomain));
     config = Replaced(config, "# folder: runs", "folder: runs");
-    config = Replaced(config, "address: 127.0.0.1", "address: 127.0.0.31");
     config = Replaced(config, "port: tilt_target", "port: " + (folder_ / "tilt_target"));
     config = Replaced(config, "port: tilt_camera", "port: " + (folder_ / "tilt_camera"));
     test::WriteText(folder_ / "camera_box.yaml", config);
@@ -49,7 +48,7 @@ class WholeMachine : public ::testing::Test {
                                                                         "--rig",
                                                                         folder_ / "rig.yaml",
                                                                         "--address",
-                                                                        "127.0.0.31",
+                                                                        "127.0.0.1",
                                                                         "--rate",
                                                                         "10",
                                                                         "--target-port",
