@@ -79,7 +79,7 @@ Depth DepthOf(png_structp png, png_infop info) {
 }
 
 // False and state.fault set when the header is of no image that is wanted here.
-bool AcceptHeader(DecodeState& state) {
+[[gnu::noinline]] bool AcceptHeader(DecodeState& state) {
   if (png_get_color_type(state.png, state.info) != PNG_COLOR_TYPE_GRAY ||
       png_get_bit_depth(state.png, state.info) < 8) {
     state.fault =
