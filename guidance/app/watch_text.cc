@@ -132,16 +132,27 @@ std::string QuotedText(std::string_view text) {
 
 }  // namespace
 
+// Status and age stand right behind the name: on a narrow terminal the numbers are cut, never the
+// word that says what they are worth.
 std::string WatchScreen(const std::vector<WatchRow>& rows, int width_chars, bool with_colours) {
+  constexpr std::size_t kLongestStatus = 34;
   const auto width = static_cast<std::size_t>(std::max(width_chars, 20));
+  std::size_t what_width = 0;
+  std::size_t status_width = 0;
+  std::size_t value_width = 0;
+  for (const WatchRow& row : rows) {
+    what_width = std::max(what_width, row.what.size());
+    status_width = std::max(status_width, std::min(row.status.size(), kLongestStatus));
+    value_width = std::max(value_width, row.value.size());
+  }
   std::string screen;
   for (const WatchRow& row : rows) {
-    const std::string text = watch::Harmless(fmt::format("{} {} {} {:>8}  {}",
-                                                         Cut(row.what, 24),
-                                                         Cut(row.value, 58),
-                                                         Cut(row.sigma, 20),
+    const std::string text = watch::Harmless(fmt::format("{}  {} {:>8}  {}  {}",
+                                                         Cut(row.what, what_width),
+                                                         Cut(row.status, status_width),
                                                          row.age,
-                                                         row.status));
+                                                         Cut(row.value, value_width),
+                                                         row.sigma));
     const std::string_view colour = with_colours ? ColourOf(row.style) : "";
     screen += colour;
     screen += text.substr(0, width);

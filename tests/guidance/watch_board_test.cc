@@ -184,6 +184,8 @@ TEST(WatchBoard, LinesFitTheTerminal) {
     EXPECT_LE(end - at, 60u);
     at = end + 1;
   }
+  // What a number is worth stays visible when the numbers themselves are cut.
+  EXPECT_THAT(WatchScreen(board.Rows(NowAfter({})), 40, false), HasSubstr("pose tbm7      ok"));
   EXPECT_THAT(WatchScreen(board.Rows(NowAfter({})), 132, true), HasSubstr("\x1b[32mpose tbm7"));
 }
 
