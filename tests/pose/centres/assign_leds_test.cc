@@ -16,6 +16,9 @@ namespace {
 long allocations = 0;
 }  // namespace
 
+// GCC sees malloc behind new and free behind delete only after inlining, and takes it for a mismatch.
+#pragma GCC diagnostic ignored "-Wmismatched-new-delete"
+
 void* operator new(std::size_t size) {
   ++allocations;
   if (void* memory = std::malloc(size)) return memory;
