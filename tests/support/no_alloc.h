@@ -33,7 +33,8 @@ inline void* CountedAllocate(std::size_t size, std::size_t alignment) {
 
 }  // namespace tbm::test
 
-// GCC sees malloc behind new and free behind delete only after inlining, and takes it for a mismatch.
+// GCC sees malloc behind new and free behind delete only after inlining, and takes it for a
+// mismatch.
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"
 
 void* operator new(std::size_t size) { return tbm::test::CountedAllocate(size, 1); }

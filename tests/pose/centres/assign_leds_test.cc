@@ -16,7 +16,8 @@ namespace {
 long allocations = 0;
 }  // namespace
 
-// GCC sees malloc behind new and free behind delete only after inlining, and takes it for a mismatch.
+// GCC sees malloc behind new and free behind delete only after inlining, and takes it for a
+// mismatch.
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"
 
 void* operator new(std::size_t size) {
