@@ -117,7 +117,7 @@ class Section {
 
 class Reader {
  public:
-  Reader(std::string file, RigFileFaults* faults) : file_(std::move(file)), faults_(faults) {}
+  explicit Reader(std::string file) : file_(std::move(file)) {}
 
   BoxConfig Read(const YamlNode& root) {
     BoxConfig config;
@@ -335,7 +335,6 @@ class Reader {
   }
 
   std::string file_;
-  RigFileFaults* faults_;
 };
 
 }  // namespace
@@ -345,7 +344,7 @@ Result<BoxConfig, RigFileFaults> ParseBoxConfig(std::string_view yaml, const std
   BoxConfig config;
   try {
     const YAML::Node root = YAML::Load(std::string(yaml));
-    config = Reader(file, &faults).Read(YamlNode(root, "", file, &faults));
+    config = Reader(file).Read(YamlNode(root, "", file, &faults));
   } catch (const YAML::Exception& error) {
     faults.push_back({file, error.mark.line + 1, "", "not YAML: " + error.msg});
   }
