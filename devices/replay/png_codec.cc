@@ -200,7 +200,7 @@ ImageResult ParsePng(std::span<const std::uint8_t> bytes, std::optional<ImageSiz
 
 std::optional<std::vector<std::uint8_t>> EncodePng(const ImageView& image, int png_effort) {
   const int bits = image.bytes_per_pixel * 8;
-  const int bits_used = std::bit_width(image.max_value);
+  const auto bits_used = static_cast<int>(std::bit_width(image.max_value));
   const bool is_power = image.max_value == (1u << bits_used) - 1u;
   if (!is_power || bits_used > bits || (bits == 8 && bits_used < 8)) return std::nullopt;
   EncodeState state;
