@@ -82,13 +82,8 @@ void BcdFrameEmulator::SendAngles(Unit& unit,
   if (is(EmulatorFaultKind::kOutOfRange)) angles.x_deg = angles.y_deg = kBeyondAnyRangeDeg;
 
   const int address = unit.tilt.address ^ (is(EmulatorFaultKind::kOtherId) ? 0x40 : 0);
-  auto reply = ToVector(EncodeFrame(
-      family_, EncodeAngles(static_cast<std::uint8_t>(address), unit.tilt.layout, angles)));
-  if (fault) reply = SpoilBytes(std::move(reply), *fault);
-  if (reply.empty()) return;
-  auto due = sensed + think_time_ + line_.LineTime(reply.size());
-  if (is(EmulatorFaultKind::kLate)) due += fault->delay;
-  outbox.At(due, std::move(reply));
+  const BcdFrame reply = EncodeAngles(static_cast<std::uint8_t>(address), unit.tilt.layout, angles);
+  SayReply(ToVector(EncodeFrame(family_, reply)), fault, sensed + think_time_, line_, outbox);
 }
 
 std::optional<PtyInstrument::SteadyTime> BcdFrameEmulator::OnTurn(SteadyTime now,

@@ -83,4 +83,16 @@ std::vector<std::uint8_t> SpoilBytes(std::vector<std::uint8_t> reply, const Emul
   return reply;
 }
 
+void SayReply(std::vector<std::uint8_t> reply,
+              const std::optional<EmulatorFault>& fault,
+              PtyOutbox::SteadyTime begin,
+              const SerialSettings& line,
+              PtyOutbox& outbox) {
+  if (fault) reply = SpoilBytes(std::move(reply), *fault);
+  if (reply.empty()) return;
+  auto due = begin + line.LineTime(reply.size());
+  if (fault && fault->kind == EmulatorFaultKind::kLate) due += fault->delay;
+  outbox.At(due, std::move(reply));
+}
+
 }  // namespace tbm

@@ -8,6 +8,9 @@
 #include <string_view>
 #include <vector>
 
+#include "devices/bus/byte_link.h"
+#include "devices/bus/pty_server.h"
+
 namespace tbm {
 
 // What an emulated inclinometer can be told to do wrong with its next replies.
@@ -51,5 +54,12 @@ class FaultQueue {
 
 // What the fault does to the bytes of a sound reply. Empty: nothing is sent.
 std::vector<std::uint8_t> SpoilBytes(std::vector<std::uint8_t> reply, const EmulatorFault& fault);
+
+// Says `reply`, spoiled where there is a fault, from `begin` on over a line of this speed.
+void SayReply(std::vector<std::uint8_t> reply,
+              const std::optional<EmulatorFault>& fault,
+              PtyOutbox::SteadyTime begin,
+              const SerialSettings& line,
+              PtyOutbox& outbox);
 
 }  // namespace tbm

@@ -44,13 +44,11 @@ void ModbusEmulator::Answer(const ModbusReadRequest& request, SteadyTime now, Pt
     ++requests_seen_;
     const std::optional<EmulatorFault> fault = faults_.Take();
     const auto heard = line_.LineTime(kModbusReadRequestSize);
-    std::vector<std::uint8_t> reply =
-        ReplyTo(request, tilts_[i], &last_[i], fault, clock_.Now() + heard);
-    if (fault) reply = SpoilBytes(std::move(reply), *fault);
-    if (reply.empty()) return;
-    auto due = now + heard + think_time_ + line_.LineTime(reply.size());
-    if (fault && fault->kind == EmulatorFaultKind::kLate) due += fault->delay;
-    outbox.At(due, std::move(reply));
+    SayReply(ReplyTo(request, tilts_[i], &last_[i], fault, clock_.Now() + heard),
+             fault,
+             now + heard + think_time_,
+             line_,
+             outbox);
     return;
   }
 }

@@ -127,9 +127,12 @@ ExitCode WriteOut(const OutputFile& out, const std::string& text, const Console&
   return ExitCode::kBadInput;
 }
 
-}  // namespace
-
-ExitCode RunSolve(const SolveRequest& request, const Console& console) {
+// Solves the run's frames one by one into `sink`; then writes what `text` makes of them, whole or
+// not at all.
+ExitCode SolveToFile(const SolveRequest& request,
+                     const Console& console,
+                     const std::function<void(const Rig&, const FrameResult&)>& sink,
+                     const std::function<std::string(const Rig&)>& text) {
   const OutputFile out(request.out, request.force);
   if (const auto obstacle = out.Obstacle()) {
     Complain(console, *obstacle);
@@ -137,15 +140,26 @@ ExitCode RunSolve(const SolveRequest& request, const Console& console) {
   }
   const auto run = OpenRun(request, console);
   if (!run) return ExitCode::kBadInput;
+  SolveFrames(*run, request, console, [&](const FrameResult& result) { sink(run->rig, result); });
+  return WriteOut(out, text(run->rig), console);
+}
+
+}  // namespace
+
+ExitCode RunSolve(const SolveRequest& request, const Console& console) {
   std::vector<std::vector<std::string>> rows;
   Tally tally;
-  SolveFrames(*run, request, console, [&](const FrameResult& result) {
-    rows.push_back(PoseValues(run->rig, result));
-    tally.Count(result);
-  });
-  const auto columns = PoseColumns(run->rig);
-  const ExitCode code = WriteOut(
-      out, request.as_json ? TableAsJson(columns, rows) : TableAsCsv(columns, rows), console);
+  const ExitCode code = SolveToFile(
+      request,
+      console,
+      [&](const Rig& rig, const FrameResult& result) {
+        rows.push_back(PoseValues(rig, result));
+        tally.Count(result);
+      },
+      [&](const Rig& rig) {
+        const auto columns = PoseColumns(rig);
+        return request.as_json ? TableAsJson(columns, rows) : TableAsCsv(columns, rows);
+      });
   if (code == ExitCode::kDone && console.err_is_terminal) {
     console.err << fmt::format("{}: {} frames: {}\n", request.out, rows.size(), tally.Text());
   }
@@ -153,18 +167,12 @@ ExitCode RunSolve(const SolveRequest& request, const Console& console) {
 }
 
 ExitCode RunCentres(const SolveRequest& request, const Console& console) {
-  const OutputFile out(request.out, request.force);
-  if (const auto obstacle = out.Obstacle()) {
-    Complain(console, *obstacle);
-    return ExitCode::kBadInput;
-  }
-  const auto run = OpenRun(request, console);
-  if (!run) return ExitCode::kBadInput;
   std::string text = CentreHeader();
-  SolveFrames(*run, request, console, [&](const FrameResult& result) {
-    text += CentreRows(run->rig, result);
-  });
-  return WriteOut(out, text, console);
+  return SolveToFile(
+      request,
+      console,
+      [&](const Rig& rig, const FrameResult& result) { text += CentreRows(rig, result); },
+      [&](const Rig&) { return text; });
 }
 
 }  // namespace tbm

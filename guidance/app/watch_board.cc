@@ -213,7 +213,7 @@ void WatchBoard::AppendHealth(const WatchNow& now, std::vector<WatchRow>& rows) 
                              health.reconnects),
                  "",
                  "",
-                 watch::DeviceStateText(health.state),
+                 std::string(dds::StateCode(health.state)),
                  StyleOf(health.state)};
     if (!health.detail.empty()) row.status += ": " + std::string(health.detail);
     rows.push_back(
@@ -248,7 +248,7 @@ void WatchBoard::AppendEvents(const WatchNow& now, std::vector<WatchRow>& rows) 
          fmt::format("{}: {}", event.code.view(), event.text.view()),
          "",
          AgeText(WatchAgeS(heard->received_at, event.at, now)),
-         std::string(watch::SeverityText(event.severity)) + (event.active ? ", stands" : ""),
+         std::string(dds::SeverityCode(event.severity)) + (event.active ? ", stands" : ""),
          is_bad        ? WatchStyle::kBad
          : is_doubtful ? WatchStyle::kDegraded
                        : WatchStyle::kPlain});

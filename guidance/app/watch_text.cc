@@ -40,34 +40,6 @@ std::string StatusText(PoseStatus status, PoseReason reason) {
   return text;
 }
 
-std::string DeviceStateText(dds::DeviceState state) {
-  switch (state) {
-    case dds::DeviceState::kClosed:
-      return "closed";
-    case dds::DeviceState::kOpening:
-      return "opening";
-    case dds::DeviceState::kStreaming:
-      return "streaming";
-    case dds::DeviceState::kSilent:
-      return "silent";
-    case dds::DeviceState::kFault:
-      return "fault";
-  }
-  return "?";
-}
-
-std::string_view SeverityText(dds::Severity severity) {
-  switch (severity) {
-    case dds::Severity::kInfo:
-      return "info";
-    case dds::Severity::kWarning:
-      return "warning";
-    case dds::Severity::kAlarm:
-      return "alarm";
-  }
-  return "?";
-}
-
 std::string Harmless(std::string_view text) {
   std::string harmless(text);
   for (char& c : harmless) {
@@ -239,7 +211,7 @@ std::string WatchLine(const dds::DeviceHealth& health, double age_s) {
                               health.published_at,
                               age_s,
                               is_stale,
-                              watch::DeviceStateText(health.state)) +
+                              std::string(dds::StateCode(health.state))) +
                      " device=" + watch::Harmless(health.device_id);
   line += fmt::format(" good={} lost={} errors={} reconnects={}",
                       health.samples_good,
@@ -257,7 +229,7 @@ std::string WatchLine(const dds::Event& event, double age_s) {
       age_s,
       watch::Harmless(event.source),
       watch::Harmless(event.code),
-      watch::SeverityText(event.severity),
+      dds::SeverityCode(event.severity),
       event.active ? "yes" : "no",
       QuotedText(event.text));
 }

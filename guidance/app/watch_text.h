@@ -15,8 +15,6 @@ extern const double kStaleHealthS;
 std::string AgeText(double age_s);                             // "0.12 s", "3 min", "2 h"
 std::string Mm(double value_m);                                // right-aligned, hundredths
 std::string StatusText(PoseStatus status, PoseReason reason);  // "degraded few_leds"
-std::string DeviceStateText(dds::DeviceState state);
-std::string_view SeverityText(dds::Severity severity);
 
 // Text from the wire for a terminal: control characters, which could redraw the screen, become '?'.
 std::string Harmless(std::string_view text);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <string_view>
 
 #include <Eigen/Core>
 
@@ -103,6 +104,23 @@ struct RelativePose {
 
 enum class DeviceState { kClosed, kOpening, kStreaming, kSilent, kFault };
 
+// The word as it stands in logs and on screens: "streaming".
+constexpr std::string_view StateCode(DeviceState state) {
+  switch (state) {
+    case DeviceState::kClosed:
+      return "closed";
+    case DeviceState::kOpening:
+      return "opening";
+    case DeviceState::kStreaming:
+      return "streaming";
+    case DeviceState::kSilent:
+      return "silent";
+    case DeviceState::kFault:
+      return "fault";
+  }
+  return "";
+}
+
 // How one device is. Sent at every change and once a second.
 struct DeviceHealth {
   MachineId machine_id;
@@ -118,6 +136,19 @@ struct DeviceHealth {
 };
 
 enum class Severity { kInfo, kWarning, kAlarm };
+
+// Same for a severity: "alarm".
+constexpr std::string_view SeverityCode(Severity severity) {
+  switch (severity) {
+    case Severity::kInfo:
+      return "info";
+    case Severity::kWarning:
+      return "warning";
+    case Severity::kAlarm:
+      return "alarm";
+  }
+  return "";
+}
 
 // Something that happened, or an alarm that came or went.
 struct Event {

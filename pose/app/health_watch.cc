@@ -13,39 +13,11 @@ constexpr milliseconds kHeartbeat(1000);
 constexpr milliseconds kPoseMissed(1000);
 constexpr std::size_t kMaxQueuedEvents = 256;
 
-std::string_view CodeOf(dds::DeviceState state) {
-  switch (state) {
-    case dds::DeviceState::kClosed:
-      return "closed";
-    case dds::DeviceState::kOpening:
-      return "opening";
-    case dds::DeviceState::kStreaming:
-      return "streaming";
-    case dds::DeviceState::kSilent:
-      return "silent";
-    case dds::DeviceState::kFault:
-      return "fault";
-  }
-  return "fault";
-}
-
-std::string_view CodeOf(dds::Severity severity) {
-  switch (severity) {
-    case dds::Severity::kInfo:
-      return "info";
-    case dds::Severity::kWarning:
-      return "warning";
-    case dds::Severity::kAlarm:
-      return "alarm";
-  }
-  return "alarm";
-}
-
 void LogLine(const dds::Event& event) {
   fmt::print(stderr,
              "at_utc_ns={} severity={} source={} code={} active={} text=\"{}\"\n",
              event.at.ns,
-             CodeOf(event.severity),
+             dds::SeverityCode(event.severity),
              event.source.view(),
              event.code.view(),
              event.active,
@@ -78,7 +50,7 @@ void HealthWatch::Update(std::string_view device_id, dds::DeviceHealth health) {
           !is_well,
           fmt::format("{} is {}{}{}",
                       device_id,
-                      CodeOf(health.state),
+                      dds::StateCode(health.state),
                       health.detail.empty() ? "" : ": ",
                       health.detail.view()));
   }

@@ -33,23 +33,6 @@ PoseReason ReasonOf(AssignFailure failure) {
   return PoseReason::kNoMatch;
 }
 
-PoseReason ReasonOf(PoseFailure failure) {
-  switch (failure) {
-    case PoseFailure::kTooFewLeds:
-      return PoseReason::kTooFewLeds;
-    case PoseFailure::kNotObservable:
-      return PoseReason::kNotObservable;
-    case PoseFailure::kBehindCamera:
-      return PoseReason::kBehindCamera;
-    case PoseFailure::kNotConverged:
-      return PoseReason::kNotConverged;
-    case PoseFailure::kAmbiguous:
-      return PoseReason::kAmbiguous;
-  }
-  TBM_CHECK(false);
-  return PoseReason::kNotConverged;
-}
-
 Inclination InclinationOf(const FrameTilt& tilt) {
   return tilt.observation ? tilt.observation->inclination : Inclination{kNaN, kNaN};
 }

@@ -17,23 +17,6 @@ namespace {
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr std::size_t kMaxExclusions = kMaxLeds + 1;
 
-PoseReason ReasonOf(PoseFailure failure) {
-  switch (failure) {
-    case PoseFailure::kTooFewLeds:
-      return PoseReason::kTooFewLeds;
-    case PoseFailure::kNotObservable:
-      return PoseReason::kNotObservable;
-    case PoseFailure::kBehindCamera:
-      return PoseReason::kBehindCamera;
-    case PoseFailure::kNotConverged:
-      return PoseReason::kNotConverged;
-    case PoseFailure::kAmbiguous:
-      return PoseReason::kAmbiguous;
-  }
-  TBM_CHECK(false);
-  return PoseReason::kNone;
-}
-
 bool HasTilts(const PoseProblem& problem) { return problem.target_tilt && problem.camera_tilt; }
 
 PoseResult SolveWhatIsThere(const PoseProblem& problem,

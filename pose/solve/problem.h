@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "pose/base/fixed_vector.h"
+#include "pose/base/pose_reason.h"
 #include "pose/base/result.h"
 #include "pose/geometry/rigid3.h"
 #include "pose/geometry/tilt.h"
@@ -46,6 +47,7 @@ enum class PoseFailure {
   kNotConverged,
   kAmbiguous,  // several poses explain the sightings equally well and no start decides
 };
+PoseReason ReasonOf(PoseFailure failure);
 
 struct SolveOptions {
   int max_iterations = 20;

@@ -8,11 +8,13 @@
 #include "idl/cpp/publisher.h"
 #include "idl/cpp/subscriber.h"
 #include "tests/idl/dds_support.h"
-#include "tests/idl/process.h"
 #include "tests/idl/samples.h"
+#include "tests/support/process.h"
 
 namespace tbm::dds::test {
 namespace {
+
+using ::tbm::test::Process;
 
 const std::string kPeer = TBM_CYCLONE_PEER;
 const std::vector<std::string> kOnLoopback = {

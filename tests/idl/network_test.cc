@@ -6,10 +6,12 @@
 #include <gtest/gtest.h>
 
 #include "tests/idl/dds_support.h"
-#include "tests/idl/process.h"
+#include "tests/support/process.h"
 
 namespace tbm::dds::test {
 namespace {
+
+using ::tbm::test::Process;
 
 const std::string kPeer = TBM_PEER;
 

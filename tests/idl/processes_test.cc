@@ -7,11 +7,14 @@
 #include "idl/cpp/publisher.h"
 #include "idl/cpp/subscriber.h"
 #include "tests/idl/dds_support.h"
-#include "tests/idl/process.h"
 #include "tests/idl/samples.h"
+#include "tests/support/process.h"
+#include "tests/support/temp_folder.h"
 
 namespace tbm::dds::test {
 namespace {
+
+using ::tbm::test::Process;
 
 const std::string kPeer = TBM_PEER;
 const std::string kOtherVersionPeer = TBM_OTHER_VERSION_PEER;
@@ -134,27 +137,22 @@ TEST(OtherVersion, WithoutAnIdIsStoppedAtTheBoundary) {
 // A settings file in the working directory must not change how a process talks: this one would put
 // it into shared memory alone.
 TEST(WorkingDirectory, WithASettingsFileChangesNothing) {
-  const auto folder =
-      std::filesystem::temp_directory_path() / ("tbm_idl_settings_" + std::to_string(getpid()));
-  std::filesystem::create_directories(folder);
+  const ::tbm::test::TempFolder folder;
   const std::string file = folder / "DEFAULT_FASTRTPS_PROFILES.xml";
-  if (std::FILE* stream = std::fopen(file.c_str(), "w")) {
-    std::fputs(
-        "<?xml version=\"1.0\"?><dds><profiles xmlns=\"http://www.eprosima.com/XMLSchemas/"
-        "fastRTPS_Profiles\"><participant profile_name=\"p\" is_default_profile=\"true\"><rtps>"
-        "<name>from_file</name></rtps></participant><data_writer profile_name=\"w\" "
-        "is_default_profile=\"true\"><qos><reliability><kind>BEST_EFFORT</kind></reliability></qos>"
-        "</data_writer></profiles><library_settings><intraprocess_delivery>FULL"
-        "</intraprocess_delivery></library_settings></dds>",
-        stream);
-    std::fclose(stream);
-  }
+  ::tbm::test::WriteText(
+      file,
+      "<?xml version=\"1.0\"?><dds><profiles xmlns=\"http://www.eprosima.com/XMLSchemas/"
+      "fastRTPS_Profiles\"><participant profile_name=\"p\" is_default_profile=\"true\"><rtps>"
+      "<name>from_file</name></rtps></participant><data_writer profile_name=\"w\" "
+      "is_default_profile=\"true\"><qos><reliability><kind>BEST_EFFORT</kind></reliability></qos>"
+      "</data_writer></profiles><library_settings><intraprocess_delivery>FULL"
+      "</intraprocess_delivery></library_settings></dds>");
   AlarmLog alarms;
   Participant reading(OnLoopback(125, "reading"), alarms.Handler());
   Subscriber<RelativePose> subscriber(reading);
   Process writer({"env",
                   "-C",
-                  folder,
+                  folder.path(),
                   "FASTRTPS_DEFAULT_PROFILES_FILE=" + file,
                   "ROS_DISCOVERY_SERVER=127.0.0.1:1",
                   kPeer,
@@ -168,7 +166,6 @@ TEST(WorkingDirectory, WithASettingsFileChangesNothing) {
   EXPECT_EQ(alarms.Count(AlarmKind::kIncompatibleQos), 0);
   writer.Signal(SIGKILL);
   writer.Wait();
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

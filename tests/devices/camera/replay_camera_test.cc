@@ -11,6 +11,7 @@
 
 #include "tests/devices/camera/small_machine.h"
 #include "tests/support/fake_clock.h"
+#include "tests/support/temp_folder.h"
 
 namespace tbm::test {
 namespace {
@@ -20,8 +21,7 @@ using ::testing::HasSubstr;
 class ReplayCameraTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(::testing::TempDir()) / ("replay_" + std::to_string(getpid()));
-    std::filesystem::create_directories(folder_ / "frames");
+    std::filesystem::create_directory(folder_ / "frames");
     Write("rig.yaml", SmallRigYaml());
     Write("tilt.csv", "stamp_ns,sensor,beta_deg,gamma_deg\n1000000000,target,0.1,0.2\n");
     Write("frames/a.pgm", Pgm(320, 256, 17));
@@ -36,10 +36,8 @@ class ReplayCameraTest : public ::testing::Test {
           "1300000000,frames/small.pgm\n"
           "1400000000,frames/b.pgm\n");
   }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   void Write(const std::string& name, const std::string& content) const {
-    std::ofstream(folder_ / name, std::ios::binary) << content;
+    WriteText(folder_ / name, content);
   }
   static std::string Pgm(int width, int height, char value) {
     return "P5\n" + std::to_string(width) + " " + std::to_string(height) + "\n255\n" +
@@ -48,12 +46,12 @@ class ReplayCameraTest : public ::testing::Test {
   CameraConfig Config(bool real_time) const {
     CameraConfig config;
     config.driver = CameraDriver::kReplay;
-    config.run_folder = folder_.string();
+    config.run_folder = folder_.path();
     config.real_time = real_time;
     return config;
   }
 
-  std::filesystem::path folder_;
+  TempFolder folder_;
   FakeClock clock_;
 };
 

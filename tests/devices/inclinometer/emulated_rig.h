@@ -1,13 +1,10 @@
 #pragma once
 
 #include <chrono>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
-
-#include <unistd.h>
 
 #include "devices/inclinometer/bcd_frame_emulator.h"
 #include "devices/inclinometer/make_inclinometers.h"
@@ -33,22 +30,6 @@ class MovableTruth {
  private:
   std::mutex mutex_;
   Inclination angles_;
-};
-
-// A folder of its own, gone with the test.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "tbm_tilt_XXXXXX").string();
-    path_ = mkdtemp(pattern.data());
-  }
-  ~ScratchFolder() { std::filesystem::remove_all(path_); }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  std::string File(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
 };
 
 inline ModbusRegisterMap ThousandthsOfADegree() {

@@ -7,6 +7,7 @@
 #include <sys/resource.h>
 
 #include "tests/devices/inclinometer/emulated_rig.h"
+#include "tests/support/temp_folder.h"
 
 namespace tbm {
 namespace {
@@ -73,7 +74,7 @@ void PrintTo(const Kind& kind, std::ostream* out) { *out << kind.name; }
 class EveryDriver : public testing::TestWithParam<Kind> {
  protected:
   EveryDriver() {
-    config_ = test::QuickConfig(GetParam().driver, folder_.File("tilt"));
+    config_ = test::QuickConfig(GetParam().driver, folder_ / "tilt");
     config_.automatic_output = GetParam().automatic;
   }
 
@@ -113,7 +114,7 @@ class EveryDriver : public testing::TestWithParam<Kind> {
     return std::nullopt;
   }
 
-  test::ScratchFolder folder_;
+  test::TempFolder folder_;
   SystemClock clock_;
   SystemSleeper sleeper_;
   test::MovableTruth truth_{{1.2345 * kDeg, -2.3456 * kDeg}};

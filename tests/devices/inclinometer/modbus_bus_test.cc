@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/devices/inclinometer/emulated_rig.h"
+#include "tests/support/temp_folder.h"
 
 namespace tbm {
 namespace {
@@ -47,7 +48,7 @@ bool ComesOutExact(const std::function<bool()>& attempt) {
 
 class OneInstrument : public testing::Test {
  protected:
-  OneInstrument() : config_(test::QuickConfig(InclinometerDriver::kModbus, folder_.File("tilt"))) {
+  OneInstrument() : config_(test::QuickConfig(InclinometerDriver::kModbus, folder_ / "tilt")) {
     config_.poll_period = 1ms;
   }
   // Asks until `wanted` good readings have come in. How many questions failed, or empty when a
@@ -65,7 +66,7 @@ class OneInstrument : public testing::Test {
     return failed;
   }
 
-  test::ScratchFolder folder_;
+  test::TempFolder folder_;
   SystemClock clock_;
   SystemSleeper sleeper_;
   CountingTruth truth_;
@@ -161,8 +162,7 @@ class TwoOnOneBus : public testing::Test {
  protected:
   TwoOnOneBus() {
     for (int i = 0; i < 2; ++i) {
-      InclinometerConfig config =
-          test::QuickConfig(InclinometerDriver::kModbus, folder_.File("bus"));
+      InclinometerConfig config = test::QuickConfig(InclinometerDriver::kModbus, folder_ / "bus");
       config.name = i == 0 ? "target" : "camera";
       config.address = 1 + i;
       config.poll_period = 5ms;
@@ -223,7 +223,7 @@ class TwoOnOneBus : public testing::Test {
     return failed;
   }
 
-  test::ScratchFolder folder_;
+  test::TempFolder folder_;
   SystemClock clock_;
   SystemSleeper sleeper_;
   std::vector<InclinometerConfig> configs_;

@@ -3,19 +3,21 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "devices/inclinometer/make_inclinometers.h"
 #include "pose/base/angle.h"
 #include "pose/geometry/rigid3.h"
 #include "tests/devices/camera/gige_bench.h"
+#include "tests/support/process.h"
 #include "tests/support/scene.h"
+#include "tests/support/temp_folder.h"
 
 namespace tbm::test {
 namespace {
@@ -52,37 +54,22 @@ std::vector<TrueRow> ReadTruth(const std::string& path) {
 class TbmSim : public ::testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(::testing::TempDir()) / ("tbm_sim_" + std::to_string(getpid()));
-    std::filesystem::create_directories(folder_);
-    std::ofstream(folder_ / "rig.yaml") << SmallRigYaml();
-    std::vector<std::string> words = {TBM_SIM,
-                                      "--rig",
-                                      Path("rig.yaml"),
-                                      "--truth",
-                                      Path("truth.csv"),
-                                      "--target-port",
-                                      Path("target"),
-                                      "--camera-port",
-                                      Path("camera"),
-                                      "--tilt-protocol",
-                                      GetParam(),
-                                      "--seed",
-                                      "5"};
-    std::vector<char*> arguments;
-    for (std::string& word : words) arguments.push_back(word.data());
-    arguments.push_back(nullptr);
-    pid_ = fork();
-    if (pid_ == 0) {
-      execv(arguments[0], arguments.data());
-      _exit(127);
-    }
+    WriteText(Path("rig.yaml"), SmallRigYaml());
+    simulator_.emplace(std::vector<std::string>{TBM_SIM,
+                                                "--rig",
+                                                Path("rig.yaml"),
+                                                "--truth",
+                                                Path("truth.csv"),
+                                                "--target-port",
+                                                Path("target"),
+                                                "--camera-port",
+                                                Path("camera"),
+                                                "--tilt-protocol",
+                                                GetParam(),
+                                                "--seed",
+                                                "5"});
   }
-  void TearDown() override {
-    kill(pid_, SIGKILL);
-    waitpid(pid_, nullptr, 0);
-    std::filesystem::remove_all(folder_);
-  }
-  std::string Path(const char* name) const { return (folder_ / name).string(); }
+  std::string Path(const char* name) const { return folder_ / name; }
 
   InclinometerConfig Tilt(const char* name, int address) const {
     InclinometerConfig config;
@@ -99,8 +86,8 @@ class TbmSim : public ::testing::TestWithParam<std::string> {
     return config;
   }
 
-  std::filesystem::path folder_;
-  pid_t pid_ = -1;
+  TempFolder folder_;
+  std::optional<Process> simulator_;
   const SystemClock clock_;
 };
 
@@ -152,11 +139,8 @@ TEST_P(TbmSim, EndsOnSigtermWithCodeZeroAndTakesItsPortsAway) {
   }
   ASSERT_TRUE(std::filesystem::exists(Path("camera")));
   usleep(300'000);
-  kill(pid_, SIGTERM);
-  int status = 0;
-  waitpid(pid_, &status, 0);
-  EXPECT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 0);
+  simulator_->Signal(SIGTERM);
+  EXPECT_EQ(simulator_->Wait(), 0) << simulator_->Output();
   EXPECT_FALSE(std::filesystem::is_symlink(Path("camera")));
   EXPECT_FALSE(std::filesystem::is_symlink(Path("target")));
 }

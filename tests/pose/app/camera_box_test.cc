@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <mutex>
 
@@ -14,6 +13,7 @@
 #include "devices/replay/run_reader.h"
 #include "devices/sim/world.h"
 #include "pose/rig/rig_file.h"
+#include "tests/support/temp_folder.h"
 
 namespace tbm {
 namespace {
@@ -21,11 +21,6 @@ namespace {
 using std::chrono::milliseconds;
 
 const std::string kRigFile = TBM_SOURCE_DIR "/pose/app/example/rig.yaml";
-
-std::string TextOf(const std::string& path) {
-  std::ifstream stream(path);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 class ListSink final : public MessageSink {
  public:
@@ -92,9 +87,6 @@ class UnpluggableCamera final : public Camera {
 class CameraBoxTest : public ::testing::Test {
  protected:
   CameraBoxTest() : rig_(LoadRigFile(kRigFile).value().rig) {
-    char folder[] = "/tmp/tbm_camera_box_XXXXXX";
-    TBM_CHECK(mkdtemp(folder) != nullptr);
-    folder_ = folder;
     config_.machine_id = "TBM-T";
     config_.camera.driver = CameraDriver::kSim;
     config_.camera.frame_rate_hz = 20.0;
@@ -103,7 +95,6 @@ class CameraBoxTest : public ::testing::Test {
     config_.target_inclinometer.poll_period = milliseconds(20);
     config_.camera_inclinometer.poll_period = milliseconds(20);
   }
-  ~CameraBoxTest() override { std::filesystem::remove_all(folder_); }
 
   BoxParts MakeParts() {
     sim::Motion motion;
@@ -126,7 +117,7 @@ class CameraBoxTest : public ::testing::Test {
     if (!config_.recording.folder.empty()) {
       RecorderOptions options;
       options.folder = config_.recording.folder;
-      options.rig_yaml = TextOf(kRigFile);
+      options.rig_yaml = test::ReadText(kRigFile);
       options.run_max_frames = 25;
       options.free_min_bytes = 0;
       parts.recorder = std::make_unique<Recorder>(options);
@@ -151,7 +142,7 @@ class CameraBoxTest : public ::testing::Test {
   }
 
   Rig rig_;
-  std::string folder_;
+  test::TempFolder folder_;
   BoxConfig config_;
   SystemClock clock_;
   SystemSleeper sleeper_;
@@ -187,7 +178,7 @@ TEST_F(CameraBoxTest, PublishesPosesThatHoldAgainstTheSimulatedTruth) {
 }
 
 TEST_F(CameraBoxTest, RecordingsReplayBitForBit) {
-  config_.recording.folder = folder_ + "/runs";
+  config_.recording.folder = folder_ / "runs";
   {
     CameraBox box(
         config_, rig_, "hash", MakeParts(), clock_, sink_, [this](const FrameResult& result) {
@@ -266,7 +257,7 @@ TEST_F(CameraBoxTest, StopsWithinASecondAndWithoutAnAlarm) {
 
 TEST_F(CameraBoxTest, ABadRunToReplayIsAnAlarmNotACrash) {
   config_.camera.driver = CameraDriver::kReplay;
-  config_.camera.run_folder = folder_ + "/nothing";
+  config_.camera.run_folder = folder_ / "nothing";
   CameraBox box(config_, rig_, "hash", BoxParts{}, clock_, sink_);
   std::stop_source never;
   box.Run(never.get_token());

@@ -15,7 +15,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-namespace tbm::dds::test {
+namespace tbm::test {
 
 // A child process whose output is read line by line. Killed and reaped when it goes out of scope.
 class Process {
@@ -39,9 +39,7 @@ class Process {
     reader_ = std::thread([this, fd = pipe_ends[0]] { Read(fd); });
   }
   ~Process() {
-    Signal(SIGKILL);
-    Signal(SIGCONT);
-    Wait();
+    Kill();
     if (reader_.joinable()) reader_.join();
   }
   Process(const Process&) = delete;
@@ -49,6 +47,10 @@ class Process {
 
   void Signal(int signal) const {
     if (pid_ > 0 && !is_reaped_) kill(pid_, signal);
+  }
+  void Kill() {
+    Signal(SIGKILL);
+    Wait();
   }
   // Exit code; 128 + n when a signal n ended it.
   int Wait() {
@@ -101,4 +103,4 @@ class Process {
   std::thread reader_;
 };
 
-}  // namespace tbm::dds::test
+}  // namespace tbm::test

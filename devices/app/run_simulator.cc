@@ -1,0 +1,61 @@
+#include "devices/app/run_simulator.h"
+
+#include <cstdio>
+
+#include <fmt/format.h>
+
+#include "devices/app/gige_simulator.h"
+#include "devices/app/truth_writer.h"
+
+namespace tbm {
+namespace {
+
+enum ExitCode { kDone = 0, kWrongCommand = 2, kDevice = 3 };
+
+}  // namespace
+
+int RunSimulator(CLI::App& app,
+                 int argc,
+                 char** argv,
+                 const MachineOptions& options,
+                 const StartInstruments& start_instruments) {
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kWrongCommand;
+  }
+  HoldSignals();
+  const auto world = BuildWorld(options);
+  if (!world) {
+    fmt::print(stderr, "{}", world.error());
+    return kWrongCommand;
+  }
+  TruthWriter truth(options.truth_file, *world);
+  if (!options.truth_file.empty() && !truth.is_open()) {
+    fmt::print(stderr, "--truth {}: cannot be written\n", options.truth_file);
+    return kWrongCommand;
+  }
+  const Result<std::string, std::string> instruments =
+      start_instruments ? start_instruments(*world) : std::string();
+  if (!instruments) {
+    fmt::print(stderr, "{}: {}\n", app.get_name(), instruments.error());
+    return kDevice;
+  }
+  const auto camera =
+      GigeSimulator::Start(options.camera, *world, options.view, [&truth](const Shown& shown) {
+        truth.Write(shown.sensed_at);
+      });
+  if (!camera) {
+    fmt::print(stderr, "{}: {}\n", app.get_name(), camera.error());
+    return kDevice;
+  }
+  fmt::print("camera address={} serial={}\n", options.camera.address, options.camera.serial);
+  fmt::print("{}ready\n", *instruments);
+  std::fflush(stdout);
+  WaitForEnd(options.run_for_s);
+  fmt::print(
+      "camera frames_sent={} images_late={}\n", (*camera)->frames_sent(), (*camera)->images_late());
+  return kDone;
+}
+
+}  // namespace tbm
