@@ -108,8 +108,8 @@ class Camera {
  public:
   virtual ~Camera() = default;
 
-  // The next exposure. Waits up to `timeout`; beyond it only while a connection is being opened or
-  // a dead one closed (GigE: 3 s, 9 s at worst, see gige_camera.h). No heap of ours in the frame
+  // The next exposure. Waits up to `timeout`; beyond it only while a connection is being opened
+  // (GigE: 0.2 s, 3 s at worst, see gige_camera.h). No heap of ours in the frame
   // path. After a failure ask again: kEndOfRun and kBadRun are the only ones that stay.
   virtual Result<Frame, CameraFailure> WaitFrame(Duration timeout) = 0;
 

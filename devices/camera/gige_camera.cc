@@ -262,6 +262,7 @@ std::optional<CameraFailure> GigeCamera::OpenWhenDue(Duration timeout) {
   const Duration until = life_.UntilOpening(std::chrono::steady_clock::now());
   std::this_thread::sleep_for(std::min(until, timeout));
   if (until > timeout) return last_failure_;
+  if (!IsFarewellOver(timeout - std::max(until, Duration::zero()))) return last_failure_;
 
   life_.Opening();
   board_.Update([](CameraHealth& health) { health.state = CameraState::kOpening; });
@@ -450,14 +451,32 @@ CameraFailure GigeCamera::Drop(CameraFailure why, const std::string& detail) {
 void GigeCamera::Disconnect() {
   connection_->is_answering =
       !connection_->is_control_lost.load() && AnswersDiscovery(config_.address, kProbeTimeout);
-  connection_.reset();
+  if (connection_->is_answering) {
+    connection_.reset();
+  } else {
+    std::packaged_task<void()> farewell(
+        [connection = std::move(connection_)]() mutable { connection.reset(); });
+    farewell_ = farewell.get_future();
+    farewell_began_ = std::chrono::steady_clock::now();
+    std::thread(std::move(farewell)).detach();
+  }
   life_.Lost(std::chrono::steady_clock::now());
 }
 
+bool GigeCamera::IsFarewellOver(Duration patience) {
+  if (!farewell_.valid()) return true;
+  if (farewell_.wait_for(patience) != std::future_status::ready) return false;
+  farewell_ = {};
+  return true;
+}
+
 void GigeCamera::Close() {
-  if (!connection_) return;
-  Disconnect();
-  board_.Update([](CameraHealth& health) { health.state = CameraState::kClosed; });
+  if (connection_) {
+    Disconnect();
+    board_.Update([](CameraHealth& health) { health.state = CameraState::kClosed; });
+  }
+  (void)IsFarewellOver(std::max(
+      Duration::zero(), farewell_began_ + kFarewellPatience - std::chrono::steady_clock::now()));
 }
 
 }  // namespace tbm

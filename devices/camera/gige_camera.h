@@ -1,6 +1,8 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
+#include <future>
 #include <memory>
 #include <string>
 
@@ -15,8 +17,12 @@ namespace tbm {
 // A GigE Vision camera through Aravis 0.8.
 //
 // How long WaitFrame may block beyond its timeout: 0.2 s per attempt while the address does not
-// answer, 3 s when another program controls the camera (five register tries of 0.5 s), and closing
-// a connection whose camera died up to 6 s. So stopping the process takes that long at worst.
+// answer, 3 s when another program controls the camera (six register tries of 0.5 s).
+//
+// The library tells a camera goodbye in several registers, each with those 3 s, and lets nobody
+// shorten that: 5 to 9 s for a camera that died. Such a connection ends in a thread of its own; the
+// next opening waits for it; Close and the destructor until it has had kFarewellPatience. A process
+// that ends before it takes that thread along, which has nothing left to lose.
 //
 // Images are lent from kBuffers buffers allocated when the stream opens. The thread that calls
 // WaitFrame allocates nothing per frame. Aravis' own receive thread does, twice: a record of the
@@ -27,6 +33,7 @@ namespace tbm {
 class GigeCamera final : public Camera {
  public:
   static constexpr int kBuffers = 8;
+  static constexpr Duration kFarewellPatience = std::chrono::seconds(1);
 
   GigeCamera(const CameraConfig& config, const Clock& clock);
   ~GigeCamera() override;
@@ -51,6 +58,7 @@ class GigeCamera final : public Camera {
   void ApplyExposure();
   CameraFailure Drop(CameraFailure why, const std::string& detail);
   void Disconnect();
+  bool IsFarewellOver(Duration patience);
   void ReportSocketBuffer();
 
   CameraConfig config_;
@@ -60,6 +68,8 @@ class GigeCamera final : public Camera {
   FrameIdCounter ids_;
   CameraClock camera_clock_;
   std::unique_ptr<Connection> connection_;
+  std::future<void> farewell_;  // of the connection before; valid while it may not be over
+  std::chrono::steady_clock::time_point farewell_began_;
   bool was_open_ = false;
   CameraFailure last_failure_ = CameraFailure::kUnreachable;
 

@@ -1,10 +1,11 @@
 #include <array>
-#include <atomic>
 #include <cstdio>
 #include <fstream>
+#include <mutex>
 #include <sstream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -125,11 +126,18 @@ int Main(const std::string& config_file, bool check_only) {
   const SystemClock clock;
   SystemSleeper sleeper;
   const std::string rig_yaml = ReadText(config->rig_file);
-  std::atomic<CameraBox*> box_for_alarms{nullptr};
+  std::mutex alarm_mutex;  // guards the two below
+  CameraBox* box_for_alarms = nullptr;
+  std::vector<dds::Alarm> early_alarms;  // raised before there is a box, such as "no network"
   dds::Participant participant(
       participant_config,
       [&](const dds::Alarm& alarm) {
-        if (CameraBox* box = box_for_alarms.load()) box->Report(alarm);
+        const std::lock_guard lock(alarm_mutex);
+        if (box_for_alarms != nullptr) {
+          box_for_alarms->Report(alarm);
+        } else {
+          early_alarms.push_back(alarm);
+        }
       },
       [](dds::LogLevel level, std::string_view category, std::string_view text) {
         fmt::print(stderr,
@@ -146,7 +154,14 @@ int Main(const std::string& config_file, bool check_only) {
                 MakeParts(*config, loaded->rig, rig_yaml, clock, sleeper),
                 clock,
                 sink);
-  box_for_alarms = &box;
+  const auto send_alarms_to = [&](CameraBox* receiver) {
+    const std::lock_guard lock(alarm_mutex);
+    box_for_alarms = receiver;
+    if (receiver == nullptr) return;
+    for (const dds::Alarm& alarm : early_alarms) receiver->Report(alarm);
+    early_alarms.clear();
+  };
+  send_alarms_to(&box);
 
   std::stop_source stop;
   std::jthread signals([&](const std::stop_token& done) {
@@ -161,7 +176,7 @@ int Main(const std::string& config_file, bool check_only) {
              config->machine_id,
              config->dds.domain);
   box.Run(stop.get_token());
-  box_for_alarms = nullptr;
+  send_alarms_to(nullptr);
   fmt::print(stderr, "source=camera_box code=ended\n");
   return kDone;
 }

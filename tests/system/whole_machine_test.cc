@@ -10,7 +10,7 @@
 #include "devices/replay/run_reader.h"
 #include "idl/cpp/subscriber.h"
 #include "tests/idl/dds_support.h"
-#include "tests/idl/process.h"
+#include "tests/support/process.h"
 #include "tests/support/recorded_run.h"
 #include "tests/support/temp_folder.h"
 
@@ -18,7 +18,7 @@ namespace tbm {
 namespace {
 
 using dds::test::Eventually;
-using dds::test::Process;
+using test::Process;
 using ::testing::HasSubstr;
 using namespace std::chrono_literals;
 
@@ -177,6 +177,19 @@ TEST_F(WholeMachine, ADeadMachineIsSaidAndARestartedOneIsFoundAgain) {
       [&] { return box->Output().find("code=no_pose active=false") != std::string::npos; }, 5s));
   box->Signal(SIGTERM);
   EXPECT_EQ(box->Wait(), 0);
+}
+
+TEST_F(WholeMachine, WithADeadMachineItStillEndsWithinSeconds) {
+  Watcher watcher;
+  auto simulator = StartSimulator();
+  const auto box = StartBox();
+  ASSERT_TRUE(Eventually([&] { return watcher.OkCount() >= 5; }, 20s)) << box->Output();
+  simulator->Kill();
+  ASSERT_TRUE(Eventually([&] { return watcher.IsIn("camera", dds::DeviceState::kSilent); }, 5s));
+  const auto asked = std::chrono::steady_clock::now();
+  box->Signal(SIGTERM);
+  EXPECT_EQ(box->Wait(), 0) << box->Output();
+  EXPECT_LT(std::chrono::steady_clock::now() - asked, 3s);
 }
 
 // Like a power cut for the process: what it had recorded solves with the very same program, and DDS

@@ -1,13 +1,13 @@
-#include <csignal>
 #include <fstream>
+#include <optional>
 #include <thread>
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "tests/devices/camera/gige_bench.h"
 #include "tests/devices/camera/gv_proxy.h"
+#include "tests/support/process.h"
 
 namespace tbm::test {
 namespace {
@@ -16,44 +16,6 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 const SystemClock kClock;
-
-// Another program, ended by kill -9 at the latest when the test is over.
-class Program {
- public:
-  Program() = default;
-  explicit Program(std::vector<std::string> words) { Start(std::move(words)); }
-  ~Program() { Kill(); }
-  Program(const Program&) = delete;
-  Program& operator=(const Program&) = delete;
-
-  void Start(std::vector<std::string> words) {
-    Kill();
-    std::vector<char*> arguments;
-    for (std::string& word : words) arguments.push_back(word.data());
-    arguments.push_back(nullptr);
-    pid_ = fork();
-    if (pid_ == 0) {
-      execv(arguments[0], arguments.data());
-      _exit(127);
-    }
-  }
-  void Kill() {
-    if (pid_ <= 0) return;
-    kill(pid_, SIGKILL);
-    waitpid(pid_, nullptr, 0);
-    pid_ = -1;
-  }
-  // The exit code of a program that ends by itself.
-  int Wait() {
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    pid_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-
- private:
-  pid_t pid_ = -1;
-};
 
 std::string RigFile() {
   static const std::string path = [] {
@@ -96,18 +58,41 @@ TEST(GigeCamera, AHoleInTheNetworkIsCalledSilenceAndHeals) {
 }
 
 TEST(GigeCamera, ACameraThatDiesAndComesBackIsOpenedAgain) {
-  // Outlives the client: closing a connection to a dead camera takes seconds.
-  Program simulator(CameraSim());
+  std::optional<Process> simulator(std::in_place, CameraSim());
   const auto camera = MakeCamera(GigeConfig(20.0), kClock);
   ASSERT_TRUE(NextFrame(*camera));
   ASSERT_GT(FramesFor(*camera, milliseconds(500)), 3);
-  simulator.Kill();
+  simulator->Kill();
   FramesFor(*camera, milliseconds(1000));
   EXPECT_EQ(camera->Health().state, CameraState::kSilent);
-  simulator.Start(CameraSim());
+  simulator.emplace(CameraSim());
   ASSERT_TRUE(NextFrame(*camera, seconds(20)));
   EXPECT_GT(FramesFor(*camera, milliseconds(1000)), 3);
   EXPECT_EQ(camera->Health().reconnects, 1u);
+}
+
+// Neither the one who waits for a frame nor the one who ends has to sit through the library's
+// attempts to say goodbye to a camera that is not there any more.
+TEST(GigeCamera, ADeadCameraHoldsUpNeitherWaitingNorClosing) {
+  // Before and after the library has noticed.
+  for (const auto dead : {milliseconds(300), milliseconds(7000)}) {
+    Process simulator(CameraSim());
+    auto camera = MakeCamera(GigeConfig(20.0), kClock);
+    ASSERT_TRUE(NextFrame(*camera)) << simulator.Output();
+    ASSERT_GT(FramesFor(*camera, milliseconds(500)), 3);
+    simulator.Kill();
+    const auto killed = std::chrono::steady_clock::now();
+    while (std::chrono::steady_clock::now() - killed < dead) {
+      const auto asked = std::chrono::steady_clock::now();
+      (void)camera->WaitFrame(milliseconds(100));
+      EXPECT_LT(std::chrono::steady_clock::now() - asked, seconds(1));
+    }
+    const auto asked = std::chrono::steady_clock::now();
+    camera->Close();
+    EXPECT_EQ(camera->Health().state, CameraState::kClosed);
+    camera.reset();
+    EXPECT_LT(std::chrono::steady_clock::now() - asked, seconds(2)) << dead.count();
+  }
 }
 
 // Its heartbeats are answered, so the library sees nothing wrong.
@@ -129,7 +114,7 @@ TEST(GigeCamera, ACameraThatAnswersButSendsNoFramesIsOpenedAgain) {
 }
 
 TEST(GigeCamera, WithoutACameraItSaysSoAndOpensOnceThereIsOne) {
-  Program simulator;
+  std::optional<Process> simulator;
   const auto camera = MakeCamera(GigeConfig(20.0), kClock);
   const auto begun = std::chrono::steady_clock::now();
   const auto nothing = camera->WaitFrame(milliseconds(100));
@@ -139,7 +124,7 @@ TEST(GigeCamera, WithoutACameraItSaysSoAndOpensOnceThereIsOne) {
   EXPECT_EQ(camera->Health().state, CameraState::kClosed);
   EXPECT_EQ(camera->Health().failure, CameraFailure::kUnreachable);
   EXPECT_NE(camera->Health().detail.find(kCameraAddress), std::string::npos);
-  simulator.Start(CameraSim());
+  simulator.emplace(CameraSim());
   EXPECT_TRUE(NextFrame(*camera, seconds(10)));
   EXPECT_EQ(camera->Health().reconnects, 0u);
   EXPECT_FALSE(camera->Health().failure);
@@ -168,7 +153,7 @@ TEST(GigeCamera, ASecondClientIsRefusedAndTheFirstNotDisturbed) {
 TEST(GigeCamera, AfterAClientWasKilledTheNextOneGetsInWithinSeconds) {
   const auto simulator = StartSimulator();
   {
-    Program client({TBM_CAMERA_CLIENT, kCameraAddress});
+    Process client({TBM_CAMERA_CLIENT, kCameraAddress});
     const auto until = std::chrono::steady_clock::now() + seconds(10);
     while (simulator->frames_sent() < 5 && std::chrono::steady_clock::now() < until) {
       std::this_thread::sleep_for(milliseconds(50));
@@ -197,13 +182,13 @@ TEST(GigeCamera, ClosedInOrderItCanBeOpenedAgainAtOnce) {
 
 TEST(CameraSim, SaysClearlyThatItsAddressIsTaken) {
   const auto simulator = StartSimulator();
-  EXPECT_EQ(Program(CameraSim()).Wait(), 3);
+  EXPECT_EQ(Process(CameraSim()).Wait(), 3);
 }
 
 TEST(CameraSim, RefusesAWrongCommandLine) {
-  EXPECT_EQ(Program({TBM_CAMERA_SIM, "--rig", RigFile(), "--hide-led", "P9"}).Wait(), 2);
-  EXPECT_EQ(Program({TBM_CAMERA_SIM, "--rig", "no_such_rig.yaml"}).Wait(), 2);
-  EXPECT_EQ(Program({TBM_CAMERA_SIM}).Wait(), 2);
+  EXPECT_EQ(Process({TBM_CAMERA_SIM, "--rig", RigFile(), "--hide-led", "P9"}).Wait(), 2);
+  EXPECT_EQ(Process({TBM_CAMERA_SIM, "--rig", "no_such_rig.yaml"}).Wait(), 2);
+  EXPECT_EQ(Process({TBM_CAMERA_SIM}).Wait(), 2);
 }
 
 }  // namespace
