@@ -10,18 +10,6 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#if defined(__SANITIZE_THREAD__)
-// GLib, GIO and Aravis are not built for ThreadSanitizer, which therefore does not see their locks
-// and queues: every buffer they hand over would look like a race.
-extern "C" const char* __tsan_default_suppressions();
-extern "C" const char* __tsan_default_suppressions() {
-  return "called_from_lib:libaravis-0.8.so\n"
-         "called_from_lib:libgio-2.0.so\n"
-         "called_from_lib:libglib-2.0.so\n"
-         "called_from_lib:libgobject-2.0.so\n";
-}
-#endif
-
 namespace tbm::test {
 namespace {
 

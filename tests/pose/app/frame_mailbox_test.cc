@@ -1,5 +1,7 @@
 #include "pose/app/frame_mailbox.h"
 
+#include <array>
+#include <atomic>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -60,6 +62,29 @@ TEST(FrameMailbox, TheFrameInUseStaysWhileNewOnesCome) {
   EXPECT_EQ(mailbox.Take(milliseconds(0))->frame.frame_number, 499u);
 }
 
+// Frames are whole and get newer, and every one is either taken or counted.
+TEST(FrameMailbox, EveryFrameIsTakenWholeOrCounted) {
+  constexpr std::uint64_t kFrames = 3000;
+  FrameMailbox mailbox;
+  std::thread grabber([&] {
+    for (std::uint64_t number = 1; number <= kFrames; ++number)
+      mailbox.Put(Picture(number, 8).frame);
+  });
+  std::uint64_t taken = 0;
+  for (std::uint64_t last = 0; last < kFrames;) {
+    const OwnedFrame* const frame = mailbox.Take(milliseconds(1000));
+    ASSERT_NE(frame, nullptr);
+    ASSERT_GT(frame->frame.frame_number, last);
+    last = frame->frame.frame_number;
+    ++taken;
+    const auto first = static_cast<std::uint8_t>(last);
+    for (std::size_t row = 0; row < 4; ++row) ASSERT_EQ(frame->pixels[row * 6], first);
+    (void)mailbox.dropped();
+  }
+  grabber.join();
+  EXPECT_EQ(taken + mailbox.dropped(), kFrames);
+}
+
 TEST(TiltInbox, WaitsUntilBothInclinometersAreYoungerThanTheFrame) {
   TiltInbox inbox;
   inbox.Put({{100}, TiltSensor::kTarget, {0.1, 0.2}});
@@ -90,6 +115,35 @@ TEST(TiltInbox, TheOldestGivesWayAndIsCounted) {
   ASSERT_EQ(readings.size(), TiltInbox::kCapacity);
   EXPECT_EQ(readings[0].sensed_at.ns, 300 - static_cast<int>(TiltInbox::kCapacity));
   EXPECT_EQ(inbox.dropped(), 300u - TiltInbox::kCapacity);
+}
+
+TEST(TiltInbox, EveryReadingOfBothInclinometersIsTakenInOrderOrCounted) {
+  constexpr int kReadings = 5000;
+  TiltInbox inbox;
+  std::atomic<int> running = 2;
+  const auto read = [&](TiltSensor sensor) {
+    for (int i = 1; i <= kReadings; ++i) inbox.Put({{i}, sensor, {1e-3 * i, -1e-3 * i}});
+    --running;
+  };
+  std::thread target(read, TiltSensor::kTarget);
+  std::thread camera(read, TiltSensor::kCamera);
+  std::array<std::int64_t, 2> last{};
+  std::size_t taken = 0;
+  TiltInbox::Readings readings;
+  for (bool is_over = false; !is_over;) {
+    is_over = running == 0;  // what comes below is then the rest
+    inbox.TakeAll({kReadings}, milliseconds(0), &readings);
+    for (const TiltReading& reading : readings) {
+      std::int64_t& before = last[static_cast<std::size_t>(reading.sensor)];
+      EXPECT_GT(reading.sensed_at.ns, before);
+      before = reading.sensed_at.ns;
+      EXPECT_EQ(reading.inclination.beta_rad, -reading.inclination.gamma_rad);
+    }
+    taken += readings.size();
+  }
+  target.join();
+  camera.join();
+  EXPECT_EQ(taken + inbox.dropped(), 2u * kReadings);
 }
 
 }  // namespace

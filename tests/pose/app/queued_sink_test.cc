@@ -1,7 +1,9 @@
 #include "pose/app/queued_sink.h"
 
+#include <algorithm>
 #include <atomic>
 #include <future>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -61,6 +63,36 @@ TEST(QueuedSink, NeverWaitsForASlowWriteAndKeepsTheNewest) {
   }
   EXPECT_EQ(slow.poses.back(), 100u);
   EXPECT_LE(slow.poses.size(), 10u);
+}
+
+// Two threads send while the queue's own thread hands on: every message arrives once and in order,
+// or is counted as dropped.
+TEST(QueuedSink, LosesNothingUncountedWhenTwoThreadsSend) {
+  constexpr std::uint64_t kMessages = 5000;
+  SlowSink slow;
+  std::uint64_t dropped = 0;
+  {
+    QueuedSink queued(slow);
+    std::thread poses([&] {
+      dds::RelativePose pose;
+      for (pose.sample_number = 1; pose.sample_number <= kMessages; ++pose.sample_number) {
+        queued.Publish(pose);
+      }
+    });
+    dds::FrameFeatures features;
+    for (features.frame_number = 1; features.frame_number <= kMessages; ++features.frame_number) {
+      queued.Publish(features);
+      if (features.frame_number % 64 == 0) (void)queued.dropped();
+    }
+    poses.join();
+    dropped = queued.dropped();
+  }
+  EXPECT_EQ(slow.poses.size() + slow.features.size() + dropped, 2 * kMessages);
+  for (const auto* numbers : {&slow.poses, &slow.features}) {
+    EXPECT_EQ(numbers->back(), kMessages);
+    EXPECT_TRUE(std::is_sorted(numbers->begin(), numbers->end()));
+    EXPECT_EQ(std::adjacent_find(numbers->begin(), numbers->end()), numbers->end());
+  }
 }
 
 }  // namespace
