@@ -93,7 +93,9 @@ void Recorder::Run() {
     queue_.clear();
     lock.unlock();
     for (const Item& item : batch) Write(item);
-    if (writer_.WantsNewRun()) wants_new_run_ = true;
+    if (writer_.WantsNewRun() && std::chrono::steady_clock::now() >= next_try_) {
+      wants_new_run_ = true;
+    }
     const RecorderStatus status = writer_.status();
     lock.lock();
     status_ = status;
@@ -110,7 +112,7 @@ void Recorder::Write(const Item& item) {
         const std::lock_guard lock(mutex_);
         state = begin_state_;
       }
-      writer_.Begin(item.at, state);
+      if (!writer_.Begin(item.at, state)) next_try_ = std::chrono::steady_clock::now() + kTryAgain;
       return;
     }
     case Kind::kTilt:

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <mutex>
@@ -51,13 +52,16 @@ class Recorder {
   };
   static constexpr std::size_t kBuffers = 8;
   static constexpr std::size_t kQueue = 1024;
+  // After a run that could not begin. Each attempt costs the solver its monitor's window.
+  static constexpr std::chrono::seconds kTryAgain{60};
 
   void Push(const Item& item);
   void Run();
   void Write(const Item& item);
   void Gap();
 
-  RunWriter writer_;  // the thread's
+  RunWriter writer_;                                // the thread's
+  std::chrono::steady_clock::time_point next_try_;  // the thread's
   std::array<OwnedFrame, kBuffers> buffers_;
   std::atomic<bool> wants_new_run_{true};
   bool is_in_gap_ = true;  // solver's: nothing is queued until the next Begin

@@ -26,7 +26,10 @@ class ListSink final : public MessageSink {
  public:
   void Publish(const dds::FrameFeatures& message) override { Keep(message, &features); }
   void Publish(const dds::TiltReading& message) override { Keep(message, &tilts); }
-  void Publish(const dds::RelativePose& message) override { Keep(message, &poses); }
+  void Publish(const dds::RelativePose& message) override {
+    Keep(message, &poses);
+    std::this_thread::sleep_for(milliseconds(pose_takes_ms));
+  }
   void Publish(const dds::DeviceHealth& message) override { Keep(message, &health); }
   void Publish(const dds::Event& message) override { Keep(message, &events); }
 
@@ -42,6 +45,30 @@ class ListSink final : public MessageSink {
     return false;
   }
 
+  bool HasEventOf(std::string_view source, bool active) {
+    const std::lock_guard lock(mutex_);
+    for (const dds::Event& event : events) {
+      if (event.source.view() == source && event.active == active) return true;
+    }
+    return false;
+  }
+  bool HasPose(PoseReason reason) {
+    const std::lock_guard lock(mutex_);
+    for (const dds::RelativePose& pose : poses) {
+      if (pose.reason == reason) return true;
+    }
+    return false;
+  }
+  int HealthCount(std::string_view device_id, dds::DeviceState state) {
+    const std::lock_guard lock(mutex_);
+    int count = 0;
+    for (const dds::DeviceHealth& message : health) {
+      count += message.device_id.view() == device_id && message.state == state;
+    }
+    return count;
+  }
+
+  std::atomic<int> pose_takes_ms{0};
   std::vector<dds::FrameFeatures> features;
   std::vector<dds::TiltReading> tilts;
   std::vector<dds::RelativePose> poses;
@@ -84,6 +111,33 @@ class UnpluggableCamera final : public Camera {
   std::atomic<bool>* is_plugged_;
 };
 
+// An inclinometer in which a test can put a fault: an InclinometerFailure, 0 for none.
+class FaultyInclinometer final : public Inclinometer {
+ public:
+  FaultyInclinometer(std::unique_ptr<Inclinometer> sound, std::atomic<int>* fault)
+      : sound_(std::move(sound)), fault_(fault) {}
+
+  Result<TiltSample, InclinometerFailure> Read(
+      std::chrono::steady_clock::time_point deadline) override {
+    const int fault = *fault_;
+    if (fault == 0) return sound_->Read(deadline);
+    std::this_thread::sleep_for(milliseconds(20));
+    return Failure{static_cast<InclinometerFailure>(fault)};
+  }
+  InclinometerHealth Health() const override {
+    InclinometerHealth health = sound_->Health();
+    const int fault = *fault_;
+    if (fault == 0) return health;
+    health.state = InclinometerState::kSilent;
+    health.last_failure = static_cast<InclinometerFailure>(fault);
+    return health;
+  }
+
+ private:
+  std::unique_ptr<Inclinometer> sound_;
+  std::atomic<int>* fault_;
+};
+
 class CameraBoxTest : public ::testing::Test {
  protected:
   CameraBoxTest() : rig_(LoadRigFile(kRigFile).value().rig) {
@@ -112,7 +166,8 @@ class CameraBoxTest : public ::testing::Test {
     };
     const std::array configs = {config_.target_inclinometer, config_.camera_inclinometer};
     auto inclinometers = MakeInclinometers(configs, sources, clock_, sleeper_);
-    parts.target_inclinometer = std::move(inclinometers[0]);
+    parts.target_inclinometer =
+        std::make_unique<FaultyInclinometer>(std::move(inclinometers[0]), &target_tilt_fault_);
     parts.camera_inclinometer = std::move(inclinometers[1]);
     if (!config_.recording.folder.empty()) {
       RecorderOptions options;
@@ -148,6 +203,7 @@ class CameraBoxTest : public ::testing::Test {
   SystemSleeper sleeper_;
   std::shared_ptr<const sim::World> world_;
   std::atomic<bool> is_plugged_{true};
+  std::atomic<int> target_tilt_fault_{0};
   ListSink sink_;
   std::vector<FrameResult> results_;
 };
@@ -239,6 +295,53 @@ TEST_F(CameraBoxTest, AnUnpluggedCameraIsSaidAndComesBack) {
                   health.state == dds::DeviceState::kSilent && !health.detail.empty();
   }
   EXPECT_TRUE(was_silent);
+}
+
+TEST_F(CameraBoxTest, ASilentInclinometerIsSaidAndComesBack) {
+  CameraBox box(config_, rig_, "hash", MakeParts(), clock_, sink_);
+  std::stop_source stop;
+  std::jthread thread([&] { box.Run(stop.get_token()); });
+  ASSERT_TRUE(WaitFor([&] { return sink_.PoseCount() > 5; }));
+  target_tilt_fault_ = static_cast<int>(InclinometerFailure::kNoReply);
+  EXPECT_TRUE(WaitFor([&] { return sink_.HasEventOf("inclinometer_target", true); }));
+  EXPECT_TRUE(WaitFor([&] { return sink_.HasPose(PoseReason::kTiltStale); }));
+  target_tilt_fault_ = 0;
+  EXPECT_TRUE(WaitFor([&] { return sink_.HasEventOf("inclinometer_target", false); }));
+  // Said once a second also when nothing changes.
+  EXPECT_TRUE(WaitFor(
+      [&] { return sink_.HealthCount("inclinometer_camera", dds::DeviceState::kStreaming) >= 3; }));
+  stop.request_stop();
+  thread.join();
+  EXPECT_GE(sink_.HealthCount("inclinometer_target", dds::DeviceState::kSilent), 1);
+  EXPECT_EQ(sink_.HealthCount("inclinometer_camera", dds::DeviceState::kSilent), 0);
+  bool was_invalid = false;
+  for (const dds::TiltReading& tilt : sink_.tilts) {
+    was_invalid |= tilt.sensor.view() == "target" && tilt.validity == dds::Validity::kInvalid &&
+                   tilt.reason.view() == "no_reply";
+  }
+  EXPECT_TRUE(was_invalid);
+}
+
+TEST_F(CameraBoxTest, ADeadChannelHasAReasonOfItsOwn) {
+  CameraBox box(config_, rig_, "hash", MakeParts(), clock_, sink_);
+  std::stop_source stop;
+  std::jthread thread([&] { box.Run(stop.get_token()); });
+  ASSERT_TRUE(WaitFor([&] { return sink_.PoseCount() > 5; }));
+  target_tilt_fault_ = static_cast<int>(InclinometerFailure::kNotFinite);
+  EXPECT_TRUE(WaitFor([&] { return sink_.HasPose(PoseReason::kTiltNotFinite); }));
+  stop.request_stop();
+}
+
+// The solver takes three frame periods: the newest frame wins, the others are counted.
+TEST_F(CameraBoxTest, FramesThatComeTooFastAreSkippedAndCounted) {
+  sink_.pose_takes_ms = 150;
+  CameraBox box(config_, rig_, "hash", MakeParts(), clock_, sink_);
+  RunBox(box, 8);
+  ASSERT_GE(sink_.features.size(), 8u);
+  const dds::FrameFeatures& last = sink_.features.back();
+  EXPECT_GE(last.frames_skipped, 5u);
+  EXPECT_GE(last.frame_number, sink_.features.front().frame_number + 14);
+  EXPECT_LE(last.frames_skipped, last.frames_received);
 }
 
 TEST_F(CameraBoxTest, StopsWithinASecondAndWithoutAnAlarm) {

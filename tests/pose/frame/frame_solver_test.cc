@@ -140,6 +140,10 @@ TEST(FrameSolver, AMountingThatMovesDegradesThePoseWithin200Frames) {
   }
   ASSERT_GE(found_at, 260);
   EXPECT_LE(found_at, 460);
+  // It stands: the frames until the next verdict are no better.
+  for (int i = found_at + 1; i < found_at + 10; ++i) {
+    EXPECT_EQ(machine.Step(i, solver).status, PoseStatus::kDegraded) << "frame " << i;
+  }
 }
 
 // A recording that begins after the baseline was learned goes on with it.
@@ -174,6 +178,45 @@ TEST(FrameSolver, StateOfTheMonitorSurvivesTheRecord) {
     EXPECT_EQ(a.mounting.change->tail, b.mounting.change->tail);
   }
   EXPECT_TRUE(judged);
+}
+
+TEST(FrameSolver, WhatIsWrittenDownIsReadBackWhole) {
+  Machine machine;
+  FrameSolverOptions options;
+  options.monitor.window_frames = 10;
+  FrameSolver live(machine.rig(), options);
+  const std::string fresh = live.BeginRecord();
+  for (int i = 0; i < 25; ++i) machine.Step(i, live);
+  const std::string used = live.BeginRecord();
+  ASSERT_GT(used.size(), fresh.size());
+  // The last two words of a state without a baseline: the mounting alarm and "no baseline".
+  const std::string without_alarm = " 0 0\n";
+  ASSERT_TRUE(fresh.ends_with(without_alarm));
+  const std::string alarmed = fresh.substr(0, fresh.size() - without_alarm.size()) + " 1 0\n";
+  FrameSolver other(machine.rig(), options);
+  for (const std::string& state : {used, alarmed, fresh}) {
+    ASSERT_TRUE(other.RestoreState(state));
+    EXPECT_EQ(other.BeginRecord(), state);
+  }
+}
+
+// Three LEDs without tilts fit several poses: only a pose of just now tells which, and nothing
+// checks it, so it must not steer the frames after it.
+TEST(FrameSolver, ThreeLedsAloneLeanOnAYoungPoseAndAreNotLeantOn) {
+  sim::Faults faults;
+  for (const std::size_t led : {0u, 3u}) faults.hidden.push_back({led, {0.15, 1e9}});
+  Machine machine(faults);
+  for (const int later : {2, 80}) {
+    FrameSolver solver(machine.rig());
+    ASSERT_EQ(machine.Step(0, solver).status, PoseStatus::kOk);
+    machine.Render(later);
+    const FrameResult& result = solver.Solve(machine.Input(later));
+    EXPECT_EQ(result.pose.has_value(), later == 2)
+        << StatusCode(result.status) << " " << ReasonCode(result.reason);
+    // The pose that is handed on is still the first one.
+    const std::string first = std::to_string(Machine::At(0).ns);
+    EXPECT_NE(solver.BeginRecord().find(first), std::string::npos);
+  }
 }
 
 }  // namespace
