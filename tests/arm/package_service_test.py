@@ -1,0 +1,240 @@
+"""The camera box as the service that it is: Debian 12 with its own systemd as process 1, the package installed,
+a simulated machine on its loopback network. The service publishes, is watched, comes back when it hangs or
+dies, stops clean; log and memory are bounded.
+
+The amd64 package stands for the armhf one: unit, scripts and configuration are the same files.
+"""
+import argparse
+import os
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+
+import package_world as world
+
+UNIT = "tbm-camera-box"
+# Process 1 lives in namespaces and a control group of its own; nsenter takes tests to it.
+BOOT = """
+set -e
+mount --make-rprivate /
+mkdir -p "$1/../group_$2"
+mount -t cgroup2 cgroup2 "$1/../group_$2"
+mkdir -p "$1/../group_$2/tbm_test_$2"
+echo $$ > "$1/../group_$2/tbm_test_$2/cgroup.procs"
+umount "$1/../group_$2"
+rmdir "$1/../group_$2"
+exec unshare --pid --fork --mount --uts --ipc --cgroup --net --kill-child=SIGKILL sh -c '
+  set -e
+  mount --bind "$0" "$0"
+  mount -t proc proc "$0/proc"
+  # Most of these settings are the whole machine's, not the namespaces'.
+  mount --bind "$0/proc/sys" "$0/proc/sys"
+  mount -o remount,bind,ro "$0/proc/sys"
+  mount -t sysfs sysfs "$0/sys"
+  mount -t cgroup2 cgroup2 "$0/sys/fs/cgroup"
+  mount -t tmpfs -o mode=755 tmpfs "$0/run"
+  mount -t tmpfs tmpfs "$0/tmp"
+  mount -t tmpfs -o mode=755 tmpfs "$0/dev"
+  for node in "null 1 3" "zero 1 5" "full 1 7" "random 1 8" "urandom 1 9" "tty 5 0"; do
+    set -- $node
+    mknod -m 666 "$0/dev/$1" c "$2" "$3"
+  done
+  mkdir "$0/dev/pts" "$0/dev/shm"
+  mount -t devpts -o newinstance,ptmxmode=0666,mode=0620,gid=5 devpts "$0/dev/pts"
+  ln -s pts/ptmx "$0/dev/ptmx"
+  mount -t tmpfs tmpfs "$0/dev/shm"
+  hostname camera-box
+  exec env -i container=tbm-test PATH=/usr/sbin:/usr/bin:/sbin:/bin chroot "$0" /lib/systemd/systemd
+' "$1"
+"""
+# The simulator's serial ports are pseudo-terminals, which no real box has.
+FOR_THE_SIMULATOR = """[Service]
+DeviceAllow=char-pts rw
+WatchdogSec=3
+"""
+SIMULATOR = """[Service]
+ExecStart=/opt/tbm_sim --rig /opt/rig.yaml --target-port /run/sim/target --camera-port /run/sim/camera
+User=tbm-camera-box
+RuntimeDirectory=sim
+"""
+
+
+class Machine:
+    def __init__(self, root):
+        self.log = open(f"{root}.console", "w+", encoding="utf-8")
+        self.outer = subprocess.Popen(["sh", "-c", BOOT, "boot", root, str(os.getpid())], stdin=subprocess.DEVNULL,
+                                      stdout=self.log, stderr=self.log)
+        self.first = None
+        self.root = root
+
+    def wait_for_boot(self):
+        self.first = eventually(self._first_process, 20)
+        return self.first and eventually(lambda: self.run("systemctl", "is-system-running").strip()
+                                         in ("running", "degraded"), 40)
+
+    def _first_process(self):
+        try:
+            with open(f"/proc/{self.outer.pid}/task/{self.outer.pid}/children", encoding="utf-8") as file:
+                child = file.read().split()[0]
+            with open(f"/proc/{child}/comm", encoding="utf-8") as file:
+                return child if file.read().strip() == "systemd" else None
+        except (OSError, IndexError):
+            return None
+
+    def run(self, *command):
+        done = subprocess.run(["nsenter", "--target", self.first, "--all", f"--root=/proc/{self.first}/root", "--",
+                               *command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, text=True, check=False)
+        return done.stdout
+
+    def show(self, name, unit=UNIT):
+        return self.run("systemctl", "show", "--value", "-p", name, unit).strip()
+
+    def journal(self):
+        return self.run("journalctl", "--no-pager", "-o", "cat", "-u", UNIT)
+
+    def end(self):
+        if self.outer.poll() is None:
+            self.outer.send_signal(signal.SIGKILL)
+        self.outer.wait()
+        self.log.close()
+        os.remove(f"{self.root}.console")
+
+
+def eventually(condition, seconds):
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.2)
+    return None
+
+
+def prepare(box, root, package, simulator, source):
+    box.install_dependencies(root, package)
+    box.install(root, [package])
+    shutil.copy(simulator, f"{root}/opt/tbm_sim")
+    shutil.copy(f"{source}/pose/app/example/rig.yaml", f"{root}/opt/rig.yaml")
+    shutil.copy(f"{source}/pose/app/example/rig.yaml", f"{root}/etc/tbm/rig.yaml")
+    config = f"{root}/etc/tbm/camera_box.yaml"
+    with open(config, encoding="utf-8") as file:
+        text = file.read()
+    text = text.replace("# folder: /var/lib/tbm/runs", "folder: /var/lib/tbm/runs")
+    with open(config, "w", encoding="utf-8") as file:
+        file.write(text)
+    os.makedirs(f"{root}/etc/systemd/system/{UNIT}.service.d")
+    for path, text in ((f"{UNIT}.service.d/simulator.conf", FOR_THE_SIMULATOR), ("simulator.service", SIMULATOR)):
+        with open(f"{root}/etc/systemd/system/{path}", "w", encoding="utf-8") as file:
+            file.write(text)
+    # The ports' names, which udev gives on a box.
+    with open(f"{root}/etc/tmpfiles.d/ports.conf", "w", encoding="utf-8") as file:
+        file.write("L /dev/tbm/tilt_target - - - - /run/sim/target\nL /dev/tbm/tilt_camera - - - - /run/sim/camera\n")
+
+
+def came_back(machine, before):
+    """Another process than `before`, and the service says that it is ready."""
+    return eventually(lambda: machine.show("MainPID") not in ("0", before)
+                      and machine.show("ActiveState") == "active", 25)
+
+
+def check_service(checks, machine):
+    is_active = eventually(lambda: machine.show("ActiveState") == "active", 30)
+    checks.that(is_active, "the service is active", machine.run("systemctl", "status", UNIT) + machine.journal())
+    checks.that(eventually(lambda: "camera is streaming" in machine.journal(), 20), "it has the camera", machine.journal())
+    for word in ("target", "camera"):
+        checks.that(eventually(lambda name=word: f"inclinometer_{name} is streaming" in machine.journal(), 10),
+                    f"it has the serial port of the {word} inclinometer", machine.journal())
+    checks.that(eventually(lambda: "recorder is streaming" in machine.journal(), 10), "it records", machine.journal())
+    time.sleep(2.5)
+    checks.that(re.findall("code=no_pose active=(true|false)", machine.journal())[-1:] != ["true"], "it has poses",
+                machine.journal())
+    process = machine.show("MainPID")
+    checks.equal(machine.run("stat", "-c", "%U", f"/proc/{process}").strip(), UNIT, "its user")
+    checks.equal(machine.run("cat", f"/proc/{process}/stat").rsplit(")", 1)[1].split()[16], "-10", "its priority")
+    checks.equal(machine.run("stat", "-c", "%U %a", "/var/lib/tbm/runs").strip(), f"{UNIT} 750", "its folder")
+
+
+def check_watch(checks, machine):
+    process = machine.show("MainPID")
+    machine.run("kill", "-STOP", process)
+    checks.that(came_back(machine, process), "a process that hangs is replaced by the watchdog", machine.journal())
+    checks.that("watchdog" in machine.run("journalctl", "--no-pager", "-o", "cat", "-u", UNIT, "-u", "init.scope").lower(),
+                "the journal says that it was the watchdog", machine.journal())
+    for _ in range(6):
+        process = machine.show("MainPID")
+        machine.run("kill", "-KILL", process)
+        if not came_back(machine, process):
+            break
+    checks.equal(machine.show("ActiveState"), "active", "killed six times in a row, it is still started again")
+    machine.run("systemctl", "stop", UNIT)
+    checks.equal((machine.show("ActiveState"), machine.show("Result"), machine.show("ExecMainStatus")),
+                 ("inactive", "success", "0"), "it stops clean")
+    checks.that("code=ended" in machine.journal(), "it says that it ended", machine.journal())
+
+
+def check_bounds(checks, machine):
+    settings = machine.run("systemd-analyze", "cat-config", "systemd/journald.conf")
+    checks.that("SystemMaxUse=64M" in settings, "the bound of the journal is read", settings)
+    # What journald itself worked out, and says when it starts.
+    usage = machine.run("journalctl", "--no-pager", "-o", "cat", "-u", "systemd-journald", "-t", "systemd-journald")
+    checks.that("max 64.0M" in usage, "the bound of the journal is in force", usage)
+    checks.equal(machine.show("MemoryMax"), str(128 << 20), "bound of memory")
+    checks.equal(machine.show("StartLimitIntervalUSec"), "0", "no limit of starts")
+
+
+def check_package(checks, box, machine, root, package):
+    machine.run("systemctl", "start", UNIT)
+    process = machine.show("MainPID")
+    shutil.copy(package, f"{root}/opt/")
+    output = machine.run("dpkg", "--force-confold", "-i", "/opt/" + os.path.basename(package))
+    checks.that(came_back(machine, process), "an upgrade starts the new program", output + machine.journal())
+    output = machine.run("dpkg", "-P", UNIT)
+    checks.equal(machine.run("systemctl", "is-active", UNIT).strip(), "inactive", "purging stops the service")
+    checks.that("warning" not in output.lower(), "purging says nothing odd", output)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--tree", required=True)
+    parser.add_argument("--own-world", required=True)
+    arguments = parser.parse_args()
+    world.need(["mmdebstrap", "cpack", "unshare", "nsenter"])
+    checks = world.Checks()
+    out = tempfile.mkdtemp()
+    machine = None
+    try:
+        package = world.pack(arguments.source, arguments.tree, f"{out}/a", "1.0.0")[UNIT]
+        later = world.pack(arguments.source, arguments.tree, f"{out}/b", "1.1.0")[UNIT]
+        box = world.World(arguments.source, arguments.own_world, "amd64", ("systemd", "systemd-sysv", "udev"))
+        root = box.unpack()
+        checks.step("root file system unpacked")
+        prepare(box, root, package, f"{arguments.tree}/bin/tbm_sim", arguments.source)
+        checks.step("the package is installed")
+        machine = Machine(root)
+        if not machine.wait_for_boot():
+            machine.log.seek(0)
+            checks.that(False, "systemd runs", machine.log.read() + (machine.run("systemctl") if machine.first else ""))
+            checks.end()
+        machine.run("systemctl", "start", "simulator")
+        checks.step("systemd runs")
+        check_service(checks, machine)
+        checks.step("looked at")
+        check_bounds(checks, machine)
+        check_watch(checks, machine)
+        checks.step("hung, killed, stopped")
+        check_package(checks, box, machine, root, later)
+        checks.step("upgraded and purged")
+    finally:
+        if machine:
+            machine.end()
+        shutil.rmtree(out)
+    checks.end()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,132 @@
+# Debian packages, made by tools/package/build:
+#   tbm-camera-box   what runs on the box: the program, its unit, its configuration (any architecture)
+#   tbm-tools        the PC's side: tbm, tbm_sim, camera_sim
+# Included at the end of the root CMakeLists.txt.
+
+set(package_dir ${CMAKE_CURRENT_LIST_DIR})
+
+# Only what is used becomes a dependency.
+foreach(program camera_box tbm tbm_sim camera_sim)
+  if(TARGET ${program})
+    target_link_options(${program} PRIVATE -Wl,--as-needed)
+  endif()
+endforeach()
+
+install(TARGETS camera_box RUNTIME DESTINATION bin COMPONENT camera_box)
+install(FILES ${package_dir}/box/tbm-camera-box.service
+  DESTINATION lib/systemd/system COMPONENT camera_box)
+install(FILES ${package_dir}/box/sysusers.conf
+  DESTINATION lib/sysusers.d RENAME tbm-camera-box.conf COMPONENT camera_box)
+install(FILES ${package_dir}/box/sysctl.conf
+  DESTINATION lib/sysctl.d RENAME 90-tbm-camera-box.conf COMPONENT camera_box)
+install(FILES ${package_dir}/box/journald.conf
+  DESTINATION lib/systemd/journald.conf.d RENAME tbm-camera-box.conf COMPONENT camera_box)
+install(FILES ${package_dir}/box/system.conf
+  DESTINATION lib/systemd/system.conf.d RENAME tbm-camera-box.conf COMPONENT camera_box)
+install(FILES ${package_dir}/README.box.md
+  DESTINATION share/doc/tbm-camera-box RENAME README.md COMPONENT camera_box)
+# Absolute: these are the owner's to edit.
+install(FILES ${package_dir}/box/camera_box.yaml ${package_dir}/box/rig.yaml
+  DESTINATION /etc/tbm COMPONENT camera_box)
+install(FILES ${package_dir}/box/serial.rules
+  DESTINATION /etc/udev/rules.d RENAME 70-tbm-camera-box.rules COMPONENT camera_box)
+
+set(package_components camera_box)
+if(NOT CMAKE_CROSSCOMPILING)
+  list(APPEND package_components tools)
+  install(TARGETS tbm tbm_sim camera_sim RUNTIME DESTINATION bin COMPONENT tools)
+  install(FILES ${PROJECT_SOURCE_DIR}/README.md DESTINATION share/doc/tbm-tools COMPONENT tools)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/pose/app/example
+    DESTINATION share/doc/tbm-tools COMPONENT tools)
+  foreach(shell_and_file "bash;bash-completion/completions/tbm" "zsh;vendor-completions/_tbm")
+    list(GET shell_and_file 0 shell)
+    list(GET shell_and_file 1 file)
+    if(shell STREQUAL zsh)
+      string(PREPEND file "zsh/")
+    endif()
+    install(CODE "
+      set(script \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/share/${file}\")
+      file(WRITE \"\${script}\" \"\")
+      execute_process(COMMAND $<TARGET_FILE:tbm> completion ${shell}
+        OUTPUT_FILE \"\${script}\" COMMAND_ERROR_IS_FATAL ANY)" COMPONENT tools)
+  endforeach()
+endif()
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_PACKAGE_CONTACT "TBM guidance <root@localhost>")
+set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
+set(CPACK_COMPONENTS_ALL ${package_components})
+set(CPACK_COMPONENTS_GROUPING ONE_PER_GROUP)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+if(CMAKE_CROSSCOMPILING)
+  set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE armhf)
+endif()
+
+# Written by hand, for dpkg knows nothing of a sysroot; tests/arm/package*_test.py compare with what the programs
+# really load. Versions are those of Debian 12 where a symbol needs them.
+set(camera_box_libraries
+  "libaravis-0.8-0 (>= 0.8.26)"
+  "libc6 (>= 2.36)"
+  "libfastcdr1 (>= 1.0.16)"
+  "libfastrtps2.9 (>= 2.9.1+ds)"
+  "libfmt9 (>= 9.1.0+ds1)"
+  "libgcc-s1 (>= 12)"
+  "libglib2.0-0 (>= 2.74)"
+  "libmodbus5 (>= 3.1.6)"
+  "libpng16-16 (>= 1.6.39)"
+  "libssl3 (>= 3.0.0)"
+  "libstdc++6 (>= 12)"
+  "libsystemd0 (>= 246)"
+  "libtiff6 (>= 4.5.0)"
+  "libyaml-cpp0.7 (>= 0.7.0)")
+# The unit, the user and the bounds of the journal are systemd's.
+set(camera_box_depends ${camera_box_libraries} "init-system-helpers (>= 1.60)" "passwd" "systemd (>= 252)")
+set(tools_depends
+  "libaravis-0.8-0 (>= 0.8.26)"
+  "libc6 (>= 2.36)"
+  "libcholmod3 (>= 1:5.12)"
+  "libcxsparse3 (>= 1:5.12)"
+  "libfastcdr1 (>= 1.0.16)"
+  "libfastrtps2.9 (>= 2.9.1+ds)"
+  "libfmt9 (>= 9.1.0+ds1)"
+  "libgcc-s1 (>= 12)"
+  "libglib2.0-0 (>= 2.74)"
+  "libgoogle-glog0v6 (>= 0.6.0)"
+  "liblapack3 | liblapack.so.3"
+  "libpng16-16 (>= 1.6.39)"
+  "libstdc++6 (>= 12)"
+  "libtiff6 (>= 4.5.0)"
+  "libyaml-cpp0.7 (>= 0.7.0)")
+list(JOIN camera_box_depends ", " camera_box_depends)
+list(JOIN tools_depends ", " tools_depends)
+
+set(CPACK_DEBIAN_CAMERA_BOX_PACKAGE_NAME tbm-camera-box)
+set(CPACK_DEBIAN_CAMERA_BOX_PACKAGE_SECTION misc)
+set(CPACK_DEBIAN_CAMERA_BOX_PACKAGE_DEPENDS "${camera_box_depends}")
+# The names of the serial ports; the time of day.
+set(CPACK_DEBIAN_CAMERA_BOX_PACKAGE_RECOMMENDS "udev, systemd-timesyncd | time-daemon")
+set(CPACK_DEBIAN_CAMERA_BOX_PACKAGE_CONTROL_EXTRA
+  ${package_dir}/control/conffiles ${package_dir}/control/postinst
+  ${package_dir}/control/postrm ${package_dir}/control/prerm)
+set(CPACK_COMPONENT_CAMERA_BOX_DESCRIPTION
+"pose of the front shield of a tunnel boring machine
+Grabs the images of a GigE Vision camera that looks at the LED target on the
+front shield, reads two inclinometers, and publishes on DDS where the front
+shield is, with sigma, bound and reason. Runs as a watched systemd service.")
+
+set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME tbm-tools)
+set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
+set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "${tools_depends}")
+set(CPACK_DEBIAN_TOOLS_PACKAGE_SUGGESTS "gnuplot-nox")
+set(CPACK_COMPONENT_TOOLS_DESCRIPTION
+"work with recorded and live poses of a tunnel boring machine
+tbm solves recorded runs, compares with a total station and shows the live
+system; tbm_sim and camera_sim simulate the machine's camera and
+inclinometers on the network and on serial lines.")
+
+include(CPack)
