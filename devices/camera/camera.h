@@ -66,6 +66,7 @@ struct CameraHealth {
   std::uint64_t reconnects = 0;  // openings after the first that succeeded
   std::uint64_t resent_packets = 0;
   double exposure_us = 0.0;              // in force now
+  int packet_size_bytes = 0;             // of the stream, agreed on when opening; 0: no network
   std::int64_t socket_buffer_bytes = 0;  // granted by the system; 0 where there is no socket
   bool socket_buffer_short = false;      // less than configured: raise net.core.rmem_max
   std::optional<Timestamp> last_frame_sensed_at;

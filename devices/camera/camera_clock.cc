@@ -4,22 +4,27 @@
 
 namespace tbm {
 
-Timestamp CameraClock::ToHost(std::int64_t stamp_ns, Timestamp received_at) {
-  const std::int64_t difference_ns = received_at.ns - stamp_ns;
+CameraClock::SteadyTime CameraClock::ToHost(std::int64_t stamp_ns, SteadyTime received_at) {
+  const auto at = [](std::int64_t steady_ns) {
+    return SteadyTime(std::chrono::nanoseconds(steady_ns));
+  };
+  const std::int64_t received_ns =
+      std::chrono::duration_cast<std::chrono::nanoseconds>(received_at.time_since_epoch()).count();
+  const std::int64_t difference_ns = received_ns - stamp_ns;
   if (count_ == 0 || difference_ns < Smallest() - kStepNs) {
     Restart();
   } else if (difference_ns > Smallest() + kStepNs) {
     smallest_of_high_ns_ =
         high_in_a_row_ == 0 ? difference_ns : std::min(smallest_of_high_ns_, difference_ns);
-    if (++high_in_a_row_ < kStepFrames) return {stamp_ns + Smallest()};
+    if (++high_in_a_row_ < kStepFrames) return at(stamp_ns + Smallest());
     const std::int64_t offset_ns = smallest_of_high_ns_;
     Restart();
     Keep(offset_ns);
-    return {stamp_ns + offset_ns};
+    return at(stamp_ns + offset_ns);
   }
   high_in_a_row_ = 0;
   Keep(difference_ns);
-  return {stamp_ns + Smallest()};
+  return at(stamp_ns + Smallest());
 }
 
 void CameraClock::Restart() {

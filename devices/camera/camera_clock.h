@@ -1,14 +1,13 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 
-#include "pose/base/time.h"
-
 namespace tbm {
 
-// Puts the camera's own time stamps on this computer's clock.
+// Puts the camera's own time stamps on this computer's steady clock, which nobody sets.
 //
 // A camera counts ticks since it was powered: an origin that nobody knows, and a crystal that is
 // off by up to 100 ppm. A packet arrives at the true instant plus a delay that is never negative
@@ -17,9 +16,9 @@ namespace tbm {
 // free of the network's jitter. The price is the drift within the window: 6.4 s at 10 frames/s and
 // 100 ppm give 0.64 ms at worst.
 //
-// A difference that jumps by more than kStep means that a clock was set or the camera started anew.
-// Down is believed at once (a delay cannot be negative), up after kStepFrames in a row (it might be
-// congestion).
+// A difference that jumps by more than kStep means that the camera started anew or its clock was
+// set. Down is believed at once (a delay cannot be negative), up after kStepFrames in a row (it
+// might be congestion).
 class CameraClock {
  public:
   static constexpr std::size_t kWindow = 64;
@@ -29,7 +28,8 @@ class CameraClock {
   // `stamp_ns`: what the camera wrote, in ns of its clock. `received_at`: arrival of the frame's
   // first packet. Returns the stamped instant plus the smallest delay, never later than
   // received_at.
-  Timestamp ToHost(std::int64_t stamp_ns, Timestamp received_at);
+  using SteadyTime = std::chrono::steady_clock::time_point;
+  SteadyTime ToHost(std::int64_t stamp_ns, SteadyTime received_at);
 
   void Restart();
 

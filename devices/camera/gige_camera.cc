@@ -20,6 +20,8 @@ constexpr double kNoRequest = std::numeric_limits<double>::quiet_NaN();
 constexpr Duration kProbeTimeout = std::chrono::milliseconds(200);
 // Between two looks at the flag that the control channel is lost.
 constexpr Duration kSlice = std::chrono::milliseconds(100);
+// Older than this in the queue between Aravis and us is no arrival but a clock that was set.
+constexpr Duration kOldestFrame = std::chrono::seconds(2);
 
 struct Unref {
   void operator()(void* object) const { g_object_unref(object); }
@@ -317,6 +319,9 @@ std::optional<CameraFailure> GigeCamera::Open() {
   coming_us_.reset();
   ids_.Restart();
   camera_clock_.Restart();
+  const int packet_size_bytes =
+      static_cast<int>(arv_camera_gv_get_packet_size(connection->camera.get(), nullptr));
+  board_.Update([&](CameraHealth& health) { health.packet_size_bytes = packet_size_bytes; });
   connection->resent_before = board_.Read().resent_packets;
   connection_ = std::move(connection);
   return std::nullopt;
@@ -392,23 +397,34 @@ void GigeCamera::FillImage(void* opaque, Frame& frame) const {
 
 void GigeCamera::FillTimes(void* opaque, Frame& frame) {
   auto* const buffer = static_cast<ArvBuffer*>(opaque);
-  frame.received_at = {static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer))};
-  if (frame.received_at.ns == 0) frame.received_at = clock_.Now();
+  // All is reckoned on the steady clock and told in the civil time of this moment, so that the
+  // stamps follow at once when somebody sets the clock. Only a frame on its way just then has no
+  // arrival.
+  const Duration civil_ahead = CivilMinusSteady(clock_);
+  const auto now = clock_.Steady();
+  const auto civil = [&](CameraClock::SteadyTime at) {
+    return Timestamp{} + (at.time_since_epoch() + civil_ahead);
+  };
+  const Timestamp stamped_by_aravis{
+      static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer))};
+  const Duration age = civil(now) - stamped_by_aravis;
+  const bool is_plausible = age > Duration::zero() && age < kOldestFrame;
+  const auto received = is_plausible ? now - age : now;
+  frame.received_at = civil(received);
   auto stamp_ns = static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer));
   const bool is_stamped = stamp_ns != 0;
   if (config_.stamp_event == StampEvent::kExposureStart) {
     stamp_ns += Microseconds(exposure_us_).count();
   }
-  const Timestamp seen_at =
-      is_stamped ? camera_clock_.ToHost(stamp_ns, frame.received_at) : frame.received_at;
-  const Timestamp exposed_until = seen_at - Microseconds(config_.readout_latency_us);
+  const auto seen = is_stamped ? camera_clock_.ToHost(stamp_ns, received) : received;
+  const auto exposed_until = seen - Microseconds(config_.readout_latency_us);
 
   if (coming_us_ && exposed_until - Microseconds(*coming_us_) >= coming_from_) {
     exposure_us_ = *coming_us_;
     coming_us_.reset();
   }
   frame.exposure_us = exposure_us_;
-  frame.sensed_at = exposed_until - Microseconds(exposure_us_ / 2.0);
+  frame.sensed_at = civil(exposed_until - Microseconds(exposure_us_ / 2.0));
 }
 
 void GigeCamera::CountFrame(const Frame& frame, const FrameIdCounter::Step& step, bool is_first) {
@@ -438,7 +454,7 @@ void GigeCamera::ApplyExposure() {
     return;
   }
   coming_us_ = granted_us;
-  coming_from_ = clock_.Now();
+  coming_from_ = clock_.Steady();
 }
 
 CameraFailure GigeCamera::Drop(CameraFailure why, const std::string& detail) {

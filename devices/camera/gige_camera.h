@@ -77,7 +77,7 @@ class GigeCamera final : public Camera {
   double wanted_us_;                  // last request, clamped; survives a reconnect
   double exposure_us_;                // of the frames that arrive now
   std::optional<double> coming_us_;   // written to the camera at coming_from_
-  Timestamp coming_from_;
+  CameraClock::SteadyTime coming_from_{};
 };
 
 }  // namespace tbm

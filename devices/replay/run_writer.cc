@@ -300,7 +300,8 @@ bool RunWriter::WantsNewRun() {
   }
   if (work.run_frames == 0) return false;
   return work.run_frames >= work.options.run_max_frames ||
-         work.last_frame_at - work.first_frame_at >= work.options.run_max_duration ||
+         std::chrono::abs(work.last_frame_at - work.first_frame_at) >=
+             work.options.run_max_duration ||
          work.run_bytes >= work.options.total_max_bytes / 4;
 }
 

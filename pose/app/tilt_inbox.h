@@ -25,8 +25,8 @@ class TiltInbox {
       ++dropped_;
     }
     readings_.push_back(reading);
-    Timestamp& newest = newest_[static_cast<std::size_t>(reading.sensor)];
-    if (newest < reading.sensed_at) newest = reading.sensed_at;
+    // The latest, not the greatest: somebody may have set the clock back.
+    newest_[static_cast<std::size_t>(reading.sensor)] = reading.sensed_at;
     news_.notify_one();
   }
 

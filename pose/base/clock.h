@@ -31,4 +31,22 @@ class SystemClock final : public Clock {
   }
 };
 
+// How far the civil clock is ahead of the steady one, both read at one moment: of a few attempts
+// the one that was interrupted least. Changes when somebody sets the clock, and only then.
+inline Duration CivilMinusSteady(const Clock& clock) {
+  Duration smallest_gap = Duration::max();
+  Duration ahead{};
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    const auto before = clock.Steady();
+    const Timestamp civil = clock.Now();
+    const Duration gap = clock.Steady() - before;
+    if (gap >= smallest_gap) continue;
+    smallest_gap = gap;
+    ahead = Duration(civil.ns) -
+            std::chrono::duration_cast<Duration>((before + gap / 2).time_since_epoch());
+    if (gap < std::chrono::microseconds(5)) break;
+  }
+  return ahead;
+}
+
 }  // namespace tbm

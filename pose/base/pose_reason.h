@@ -22,7 +22,7 @@ enum class PoseReason {
   kFrameSize = 3,           // not the size that the rig's calibration is for
   kFrameDark = 4,           // no light anywhere: lamp, shutter, cable
   kFrameSaturated = 5,      // nearly all of the image at full scale
-  kStampNotIncreasing = 6,  // same or older time than the frame before
+  kStampNotIncreasing = 6,  // same or older time than the frame before, by up to kClockSetBack
 
   // Not enough to solve. Status none.
   kTooFewLeds = 10,     // fewer than two LED-like spots in the image

@@ -27,4 +27,9 @@ inline double SecondsBetween(Timestamp earlier, Timestamp later) {
   return static_cast<double>(later.ns - earlier.ns) * 1e-9;
 }
 
+// Nothing on the way from a sensor to the solver overtakes by as much as this. A stamp that is
+// older than the one before by more means that somebody has set the clock back; what was remembered
+// under the old clock is then of no use.
+inline constexpr Duration kClockSetBack = std::chrono::milliseconds(500);
+
 }  // namespace tbm

@@ -71,7 +71,9 @@ const FrameResult& FrameSolver::Solve(const FrameInput& frame) {
   result_ = FrameResult{};
   result_.led_of_centre.fill(-1);
   result_.sensed_at = frame.sensed_at;
-  if (last_sensed_at_ && frame.sensed_at <= *last_sensed_at_) {
+  if (last_sensed_at_ && *last_sensed_at_ - frame.sensed_at > kClockSetBack) {
+    accepted_.reset();
+  } else if (last_sensed_at_ && frame.sensed_at <= *last_sensed_at_) {
     result_.reason = PoseReason::kStampNotIncreasing;
     return result_;
   }

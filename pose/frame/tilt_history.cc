@@ -26,6 +26,9 @@ double SignificantVarianceRatio(int pairs) {
 }  // namespace
 
 void TiltHistory::Add(Timestamp sensed_at, const Inclination& inclination) {
+  if (!entries_.empty() && entries_[entries_.size() - 1].sensed_at - sensed_at > kClockSetBack) {
+    entries_.clear();
+  }
   if (entries_.full()) {
     if (sensed_at < entries_[0].sensed_at) return;
     entries_.erase(0);

@@ -39,7 +39,8 @@ class TiltHistory {
   explicit TiltHistory(const TiltHistoryOptions& options = {}) : options_(options) {}
 
   // Readings may come late or twice with one stamp; they are kept in the order of their stamps, an
-  // equal stamp replaces the older entry.
+  // equal stamp replaces the older entry. One that is older than the newest by more than
+  // kClockSetBack begins a new history.
   void Add(Timestamp sensed_at, const Inclination& inclination);
 
   // The tilt at `at`, in the paper's convention (sign applied), linearly interpolated between its

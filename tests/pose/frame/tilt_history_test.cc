@@ -142,5 +142,15 @@ TEST(TiltHistory, SteadyMotionDoesNotRaiseSigma) {
   EXPECT_DOUBLE_EQ(history.At(AtMs(380), MountWithSigma(0.005)).value().sigma_rad, DegToRad(0.005));
 }
 
+TEST(TiltHistory, AClockThatIsSetBackBeginsANewHistory) {
+  TiltHistory history;
+  for (int i = 0; i < 10; ++i) history.Add(AtMs(20 * i), {0.1, 0.1});
+  history.Add(AtMs(-300), {0.2, 0.2});
+  EXPECT_EQ(history.entries().size(), 11u) << "late, but no more than late";
+  history.Add(AtMs(-3'600'000), {0.3, 0.3});
+  ASSERT_EQ(history.entries().size(), 1u);
+  EXPECT_EQ(history.entries()[0].inclination.beta_rad, 0.3);
+}
+
 }  // namespace
 }  // namespace tbm
