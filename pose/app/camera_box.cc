@@ -15,6 +15,11 @@ using std::chrono::milliseconds;
 
 // How long a thread may sleep before it looks whether it should end.
 constexpr milliseconds kLook(100);
+// Longer than any loop may take: opening a camera waits for 3 s at worst.
+constexpr milliseconds kHangs(10'000);
+// What the clock has to move against the steady one before it is said. A time server steers more
+// gently.
+constexpr milliseconds kClockStep(20);
 
 PoseReason ReasonOf(FrameFault fault) {
   switch (fault) {
@@ -61,10 +66,11 @@ CameraBox::CameraBox(const BoxConfig& config,
       solver_(rig, config.solver),
       exposure_control_({config.camera.exposure_min_us, config.camera.exposure_max_us}) {}
 
-void CameraBox::Run(std::stop_token stop) {
+void CameraBox::Run(std::stop_token stop, const std::function<void()>& on_alive) {
   std::stop_source health_stop;
   const std::stop_callback on_stop(stop, [&] { health_stop.request_stop(); });
-  std::jthread health([this, token = health_stop.get_token()] { WatchHealth(token); });
+  std::jthread health(
+      [this, &on_alive, token = health_stop.get_token()] { WatchHealth(token, on_alive); });
   if (config_.camera.driver == CameraDriver::kReplay) {
     SolveReplay(stop);
   } else {
@@ -88,6 +94,7 @@ void CameraBox::Report(const dds::Alarm& alarm) {
 
 void CameraBox::Grab(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
+    beats_.Beat(LoopBeats::kGrabber, clock_.Steady());
     const auto frame = parts_.camera->WaitFrame(kLook);
     if (frame) {
       mailbox_.Put(*frame);
@@ -96,13 +103,16 @@ void CameraBox::Grab(const std::stop_token& stop) {
       break;
     }
   }
+  beats_.End(LoopBeats::kGrabber);
   parts_.camera->Close();
 }
 
 void CameraBox::ReadTilts(TiltSensor sensor,
                           Inclinometer& inclinometer,
                           const std::stop_token& stop) {
+  const auto loop = sensor == TiltSensor::kTarget ? LoopBeats::kTargetTilt : LoopBeats::kCameraTilt;
   while (!stop.stop_requested()) {
+    beats_.Beat(loop, clock_.Steady());
     const auto sample = inclinometer.Read(clock_.Steady() + kLook);
     if (sample) {
       tilt_inbox_.Put({sample->sensed_at,
@@ -114,10 +124,12 @@ void CameraBox::ReadTilts(TiltSensor sensor,
     }
     PublishTilt(sensor, sample);
   }
+  beats_.End(loop);
 }
 
 void CameraBox::SolveLive(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
+    beats_.Beat(LoopBeats::kSolver, clock_.Steady());
     const OwnedFrame* frame = mailbox_.Take(kLook);
     BeginRecordingIfDue();
     // Without a frame the readings still have to be taken, or the inbox runs over.
@@ -129,6 +141,7 @@ void CameraBox::SolveLive(const std::stop_token& stop) {
     }
     if (frame != nullptr) SolveFrame(*frame, ReasonOf(frame->frame.fault));
   }
+  beats_.End(LoopBeats::kSolver);
 }
 
 void CameraBox::SolveReplay(const std::stop_token& stop) {
@@ -283,8 +296,27 @@ FrameCounts CameraBox::Counts() const {
   return counts;
 }
 
-void CameraBox::WatchHealth(const std::stop_token& stop) {
+// Stamps follow a clock that is set at once, and nothing in the box minds; whoever reads them wants
+// to know.
+void CameraBox::WatchClock() {
+  const Duration ahead = CivilMinusSteady(clock_);
+  const Duration step = ahead - civil_ahead_;
+  civil_ahead_ = ahead;
+  if (std::chrono::abs(step) < kClockStep) return;
+  health_.Raise("camera_box",
+                "clock_set",
+                dds::Severity::kWarning,
+                false,
+                fmt::format("the clock of this computer was set {} by {:.3f} s",
+                            step > Duration::zero() ? "forward" : "back",
+                            std::abs(1e-9 * static_cast<double>(step.count()))));
+}
+
+void CameraBox::WatchHealth(const std::stop_token& stop, const std::function<void()>& on_alive) {
+  civil_ahead_ = CivilMinusSteady(clock_);
   while (!stop.stop_requested()) {
+    if (on_alive && beats_.AllWithin(kHangs, clock_.Steady())) on_alive();
+    WatchClock();
     if (parts_.camera) health_.Update("camera", HealthOf(parts_.camera->Health()));
     if (parts_.target_inclinometer) {
       health_.Update("inclinometer_target", HealthOf(parts_.target_inclinometer->Health()));

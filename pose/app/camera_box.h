@@ -17,6 +17,7 @@
 #include "pose/app/box_messages.h"
 #include "pose/app/frame_mailbox.h"
 #include "pose/app/health_watch.h"
+#include "pose/app/loop_beats.h"
 #include "pose/app/recorder.h"
 #include "pose/app/tilt_inbox.h"
 #include "pose/base/clock.h"
@@ -50,8 +51,16 @@ class CameraBox {
             std::function<void(const FrameResult&)> on_result = {});
 
   // Runs until `stop` is asked for, or a replay has ended. Ends clean: threads joined, recording
-  // closed.
-  void Run(std::stop_token stop);
+  // closed. `on_alive` (may be empty) is called about ten times a second by the health thread, as
+  // long as no loop of the box hangs.
+  void Run(std::stop_token stop, const std::function<void()>& on_alive = {});
+
+  // Any thread; of devices that the box has.
+  CameraHealth camera_health() const { return parts_.camera->Health(); }
+  InclinometerHealth inclinometer_health(TiltSensor sensor) const {
+    return (sensor == TiltSensor::kTarget ? parts_.target_inclinometer : parts_.camera_inclinometer)
+        ->Health();
+  }
 
   // From DDS threads: goes out as an event by the health thread.
   void Report(const dds::Alarm& alarm);
@@ -61,7 +70,8 @@ class CameraBox {
   void ReadTilts(TiltSensor sensor, Inclinometer& inclinometer, const std::stop_token& stop);
   void SolveLive(const std::stop_token& stop);
   void SolveReplay(const std::stop_token& stop);
-  void WatchHealth(const std::stop_token& stop);
+  void WatchHealth(const std::stop_token& stop, const std::function<void()>& on_alive);
+  void WatchClock();
 
   void SolveFrame(const OwnedFrame& frame, PoseReason image_fault);
   void BeginRecordingIfDue();
@@ -81,6 +91,8 @@ class CameraBox {
   FrameMailbox mailbox_;
   TiltInbox tilt_inbox_;
   HealthWatch health_;
+  LoopBeats beats_;
+  Duration civil_ahead_{};  // the health thread's, see WatchClock
 
   // The solver thread's.
   FrameSolver solver_;

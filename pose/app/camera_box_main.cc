@@ -1,4 +1,3 @@
-#include <array>
 #include <cstdio>
 #include <fstream>
 #include <mutex>
@@ -9,24 +8,25 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
-#include <openssl/evp.h>
 #include <signal.h>
 
 #include "devices/bus/sleeper.h"
-#include "devices/inclinometer/make_inclinometers.h"
-#include "devices/sim/world.h"
 #include "idl/cpp/participant.h"
 #include "pose/app/box_config.h"
+#include "pose/app/box_parts.h"
 #include "pose/app/camera_box.h"
 #include "pose/app/dds_sink.h"
+#include "pose/app/log_sink.h"
 #include "pose/app/queued_sink.h"
+#include "pose/app/self_test_run.h"
+#include "pose/app/service_manager.h"
 #include "pose/rig/rig_file.h"
 
 namespace tbm {
 namespace {
 
 // Exit codes of all our programs (FORMATS §6).
-enum ExitCode { kDone = 0, kConfiguration = 2, kDds = 4, kInternal = 70 };
+enum ExitCode { kDone = 0, kConfiguration = 2, kDevice = 3, kInternal = 70 };
 
 std::string ReadText(const std::string& path) {
   std::ifstream stream(path, std::ios::binary);
@@ -35,69 +35,14 @@ std::string ReadText(const std::string& path) {
   return text.str();
 }
 
-// SHA-256 in hexadecimal: what `sha256sum rig.yaml` prints.
-std::string HashOf(const std::string& text) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned int size = 0;
-  TBM_CHECK(EVP_Digest(text.data(), text.size(), digest.data(), &size, EVP_sha256(), nullptr) == 1);
-  std::string hexadecimal;
-  for (unsigned int i = 0; i < size; ++i) hexadecimal += fmt::format("{:02x}", digest[i]);
-  return hexadecimal;
-}
-
 int PrintFaults(const RigFileFaults& faults) {
   for (const RigFileFault& fault : faults) fmt::print(stderr, "{}\n", fault.Text());
   return kConfiguration;
 }
 
-dds::ParticipantConfig ParticipantConfigOf(const BoxConfig& config) {
-  dds::ParticipantConfig participant;
-  participant.domain_id = config.dds.domain;
-  participant.name = "camera_box " + config.machine_id;
-  participant.interfaces = config.dds.interfaces;
-  participant.peers = config.dds.initial_peers;
-  return participant;
-}
+enum class Job { kRun, kCheck, kSelfTest };
 
-RecorderOptions RecorderOptionsOf(const BoxConfig& config, std::string rig_yaml) {
-  RecorderOptions options;
-  options.folder = config.recording.folder;
-  options.rig_yaml = std::move(rig_yaml);
-  options.run_max_duration = config.recording.run_length;
-  options.total_max_bytes = config.recording.limit_bytes;
-  return options;
-}
-
-BoxParts MakeParts(const BoxConfig& config,
-                   const Rig& rig,
-                   const std::string& rig_yaml,
-                   const Clock& clock,
-                   Sleeper& sleeper) {
-  BoxParts parts;
-  if (!config.recording.folder.empty()) {
-    parts.recorder = std::make_unique<Recorder>(RecorderOptionsOf(config, rig_yaml));
-  }
-  if (config.camera.driver == CameraDriver::kReplay) return parts;
-
-  sim::Motion motion;
-  motion.tilt_noise_factor = 0.0;  // the simulated inclinometers add their own
-  const auto world = std::make_shared<const sim::World>(rig, motion, sim::Faults{}, clock.Now());
-  parts.camera = MakeCamera(config.camera, clock, world);
-  InclinometerSources sources;
-  sources.truths["target"] = [world](Timestamp at) {
-    return world->TiltReading(sim::TiltSensor::kTarget, at);
-  };
-  sources.truths["camera"] = [world](Timestamp at) {
-    return world->TiltReading(sim::TiltSensor::kCamera, at);
-  };
-  const std::array configs = {config.target_inclinometer, config.camera_inclinometer};
-  auto inclinometers = MakeInclinometers(configs, sources, clock, sleeper);
-  parts.target_inclinometer = std::move(inclinometers[0]);
-  parts.camera_inclinometer = std::move(inclinometers[1]);
-  return parts;
-}
-
-int Main(const std::string& config_file, bool check_only) {
+int Main(const std::string& config_file, Job job, double self_test_s) {
   const auto config = LoadBoxConfig(config_file);
   if (!config) return PrintFaults(config.error());
   const auto loaded = LoadRigFile(config->rig_file);
@@ -109,7 +54,7 @@ int Main(const std::string& config_file, bool check_only) {
     fmt::print(stderr, "{}: dds: {}\n", config_file, problem);
   }
   if (!problems.empty()) return kConfiguration;
-  if (check_only) {
+  if (job == Job::kCheck) {
     fmt::print(
         "{}: good; rig {} with {} LEDs\n", config_file, config->rig_file, loaded->rig.leds.size());
     return kDone;
@@ -126,6 +71,9 @@ int Main(const std::string& config_file, bool check_only) {
   const SystemClock clock;
   SystemSleeper sleeper;
   const std::string rig_yaml = ReadText(config->rig_file);
+  if (job == Job::kSelfTest) {
+    return RunSelfTest(*config, loaded->rig, self_test_s, clock, sleeper) ? kDone : kDevice;
+  }
   std::mutex alarm_mutex;  // guards the two below
   CameraBox* box_for_alarms = nullptr;
   std::vector<dds::Alarm> early_alarms;  // raised before there is a box, such as "no network"
@@ -147,7 +95,8 @@ int Main(const std::string& config_file, bool check_only) {
                    text);
       });
   DdsSink dds_sink(participant);
-  QueuedSink sink(dds_sink);
+  LogSink log_sink(dds_sink);
+  QueuedSink sink(log_sink);
   CameraBox box(*config,
                 loaded->rig,
                 HashOf(rig_yaml),
@@ -175,7 +124,9 @@ int Main(const std::string& config_file, bool check_only) {
              TBM_VERSION,
              config->machine_id,
              config->dds.domain);
-  box.Run(stop.get_token());
+  ServiceManager manager(clock);
+  box.Run(stop.get_token(), [&manager] { manager.TellAlive(); });
+  manager.TellStopping();
   send_alarms_to(nullptr);
   fmt::print(stderr, "source=camera_box code=ended\n");
   return kDone;
@@ -191,8 +142,18 @@ int main(int argc, char** argv) {
       "relative to the rear shield on DDS."};
   std::string config_file;
   bool check_only = false;
+  bool self_test = false;
+  double self_test_s = 5.0;
   app.add_option("config", config_file, "camera_box.yaml: devices, DDS, recording")->required();
   app.add_flag("--check", check_only, "read the configuration and the rig file, report, and end");
+  app.add_flag(
+      "--self-test",
+      self_test,
+      "for the installer: try camera, LEDs, inclinometers, clock, disk and DDS, say what is "
+      "wrong and what to do, and end");
+  app.add_option("--seconds", self_test_s, "how long --self-test measures")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 600.0));
   app.set_version_flag("--version", std::string(TBM_VERSION));
   try {
     app.parse(argc, argv);
@@ -200,7 +161,10 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : tbm::kConfiguration;
   }
   try {
-    return tbm::Main(config_file, check_only);
+    const tbm::Job job = check_only  ? tbm::Job::kCheck
+                         : self_test ? tbm::Job::kSelfTest
+                                     : tbm::Job::kRun;
+    return tbm::Main(config_file, job, self_test_s);
   } catch (const std::exception& error) {
     fmt::print(stderr, "camera_box: {}\n", error.what());
     return tbm::kInternal;

@@ -1,7 +1,5 @@
 #include "pose/app/health_watch.h"
 
-#include <cstdio>
-
 #include <fmt/format.h>
 
 namespace tbm {
@@ -12,17 +10,6 @@ using std::chrono::milliseconds;
 constexpr milliseconds kHeartbeat(1000);
 constexpr milliseconds kPoseMissed(1000);
 constexpr std::size_t kMaxQueuedEvents = 256;
-
-void LogLine(const dds::Event& event) {
-  fmt::print(stderr,
-             "at_utc_ns={} severity={} source={} code={} active={} text=\"{}\"\n",
-             event.at.ns,
-             dds::SeverityCode(event.severity),
-             event.source.view(),
-             event.code.view(),
-             event.active,
-             event.text.view());
-}
 
 }  // namespace
 
@@ -41,9 +28,14 @@ void HealthWatch::Update(std::string_view device_id, dds::DeviceHealth health) {
     const bool same_detail = place->second.health.detail == health.detail;
     if (same_detail && now - place->second.sent_at < kHeartbeat) return;
   }
+  bool has_streamed = !is_new && place->second.has_streamed;
   if (changed) {
     const bool is_well = health.state == dds::DeviceState::kStreaming;
-    const bool is_starting = is_new && !is_well;
+    // Until a device has streamed once it is being waited for; that there is no pose is said
+    // anyway.
+    has_streamed = has_streamed || is_well;
+    const bool is_starting = !has_streamed && (health.state == dds::DeviceState::kClosed ||
+                                               health.state == dds::DeviceState::kOpening);
     Raise(device_id,
           "device_state",
           is_well || is_starting ? dds::Severity::kInfo : dds::Severity::kAlarm,
@@ -54,7 +46,7 @@ void HealthWatch::Update(std::string_view device_id, dds::DeviceHealth health) {
                       health.detail.empty() ? "" : ": ",
                       health.detail.view()));
   }
-  known_.insert_or_assign(std::string(device_id), Known{health, now});
+  known_.insert_or_assign(std::string(device_id), Known{health, now, has_streamed});
   sink_.Publish(health);
 }
 
@@ -88,7 +80,7 @@ void HealthWatch::Raise(std::string_view source,
                         std::string_view code,
                         dds::Severity severity,
                         bool active,
-                        std::string text) {
+                        std::string_view text) {
   dds::Event event;
   event.machine_id = std::string_view(machine_id_);
   event.source = source;
@@ -96,7 +88,7 @@ void HealthWatch::Raise(std::string_view source,
   event.at = clock_.Now();
   event.severity = severity;
   event.active = active;
-  event.text = std::string_view(text);
+  event.text = text;
   const std::lock_guard lock(mutex_);
   if (events_.size() >= kMaxQueuedEvents) {
     ++events_dropped_;
@@ -115,10 +107,15 @@ void HealthWatch::SendEvents() {
   }
   for (dds::Event& event : events) {
     event.sample_number = ++event_numbers_[std::string(event.source.view())];
-    LogLine(event);
     sink_.Publish(event);
   }
-  if (dropped > 0) fmt::print(stderr, "source=camera_box code=events_dropped count={}\n", dropped);
+  if (dropped > 0) {
+    Raise("camera_box",
+          "events_dropped",
+          dds::Severity::kWarning,
+          false,
+          fmt::format("{} events came too fast to be told", dropped));
+  }
 }
 
 }  // namespace tbm

@@ -16,8 +16,8 @@
 
 namespace tbm {
 
-// Turns states into health messages, events and log lines: health of each device at every change
-// and once a second; an event and one log line when a state changes, not each cycle.
+// Turns states into health messages and events: health of each device at every change and once a
+// second; one event when a state changes, not each cycle.
 class HealthWatch {
  public:
   HealthWatch(std::string machine_id, const Clock& clock, MessageSink& sink)
@@ -36,7 +36,7 @@ class HealthWatch {
              std::string_view code,
              dds::Severity severity,
              bool active,
-             std::string text);
+             std::string_view text);
 
   // The health thread: sends what Raise has queued.
   void SendEvents();
@@ -45,6 +45,7 @@ class HealthWatch {
   struct Known {
     dds::DeviceHealth health;
     std::chrono::steady_clock::time_point sent_at;
+    bool has_streamed = false;  // since the process began
   };
 
   const std::string machine_id_;
