@@ -181,7 +181,7 @@ void GigeSimulator::Machinery::Fill(ArvBuffer* buffer) {
   std::memcpy(bytes, shown.pixels.data(), std::min(size, shown.pixels.size()));
   ++sent;
   if (!options.stamp_sequence || size < 8) return;
-  std::memcpy(bytes, "TBM#", 4);
+  std::copy_n("TBM#", 4, bytes);
   for (std::size_t i = 0; i < 4; ++i) bytes[4 + i] = static_cast<std::uint8_t>(sent >> (8 * i));
 }
 

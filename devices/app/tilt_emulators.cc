@@ -33,6 +33,7 @@ std::unique_ptr<ModbusEmulator> Modbus(const SerialSettings& line,
                                        const std::vector<Instrument>& instruments,
                                        const Clock& clock) {
   std::vector<EmulatedModbusTilt> tilts;
+  tilts.reserve(instruments.size());
   for (const Instrument& instrument : instruments) {
     tilts.push_back({instrument.address, Registers(), instrument.truth, 21.0});
   }
@@ -44,6 +45,7 @@ std::unique_ptr<BcdFrameEmulator> Frames(FrameFamily family,
                                          const std::vector<Instrument>& instruments,
                                          const Clock& clock) {
   std::vector<EmulatedFrameTilt> tilts;
+  tilts.reserve(instruments.size());
   for (const Instrument& instrument : instruments) {
     tilts.push_back({static_cast<std::uint8_t>(instrument.address),
                      FrameLayout::kFourByteTemperature,
@@ -58,7 +60,7 @@ std::unique_ptr<BcdFrameEmulator> Frames(FrameFamily family,
 
 Result<std::unique_ptr<TiltEmulators>, std::string> TiltEmulators::Start(
     const TiltEmulatorOptions& options,
-    std::shared_ptr<const sim::World> world,
+    const std::shared_ptr<const sim::World>& world,
     const Clock& clock) {
   const auto truth = [world](sim::TiltSensor sensor) -> TiltTruth {
     return [world, sensor](Timestamp when) { return world->TiltReading(sensor, when); };

@@ -28,7 +28,7 @@ class TiltEmulators {
  public:
   static Result<std::unique_ptr<TiltEmulators>, std::string> Start(
       const TiltEmulatorOptions& options,
-      std::shared_ptr<const sim::World> world,
+      const std::shared_ptr<const sim::World>& world,
       const Clock& clock);
 
  private:

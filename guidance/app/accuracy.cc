@@ -102,6 +102,7 @@ Result<Pairs, std::string> PairInOrder(const std::vector<PlacedPoint>& poses,
                                        const std::vector<PlacedPoint>& survey) {
   Pairs pairs;
   std::vector<const PlacedPoint*> chosen;
+  chosen.reserve(poses.size());
   for (const PlacedPoint& pose : poses) chosen.push_back(&pose);
   if (chosen.size() != survey.size()) {
     std::erase_if(chosen, [](const PlacedPoint* pose) { return !pose->xyz_mm; });

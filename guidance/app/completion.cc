@@ -74,7 +74,7 @@ std::vector<std::string> BareWords(const Command& command) {
   return words;
 }
 
-std::string ZshQuoted(std::string text) {
+std::string ZshQuoted(const std::string& text) {
   std::string quoted;
   for (const char c : text) {
     if (c == '\'') {

@@ -95,7 +95,7 @@ std::string CentreRows(const Rig& rig, const FrameResult& result) {
   std::string rows;
   for (std::size_t i = 0; i < result.centres.size(); ++i) {
     const Centre& centre = result.centres[i];
-    const int led = result.led_of_centre[i];
+    const auto led = std::ptrdiff_t{result.led_of_centre[i]};
     rows += fmt::format("{},{},{:.5f},{:.5f},{:.5f},{:.2f}\n",
                         result.sensed_at.ns,
                         led >= 0 ? rig.leds[static_cast<std::size_t>(led)].id : "",

@@ -59,7 +59,7 @@ class RigReader {
 
  private:
   static YamlNode Section(const YamlNode& parent, std::string_view name, std::string_view hint) {
-    const YamlNode section = parent.Required(name, hint);
+    YamlNode section = parent.Required(name, hint);
     if (section.exists() && !section.IsMap()) section.Fault(fmt::format("must be a map {}", hint));
     return section;
   }

@@ -31,8 +31,11 @@ std::string RangeText(const YamlRange& range) {
 
 }  // namespace
 
-YamlNode::YamlNode(YAML::Node node, std::string key, const std::string& file, RigFileFaults* faults)
-    : node_(std::move(node)), key_(std::move(key)), file_(file), faults_(faults) {
+YamlNode::YamlNode(const YAML::Node& node,
+                   std::string key,
+                   const std::string& file,
+                   RigFileFaults* faults)
+    : node_(node), key_(std::move(key)), file_(file), faults_(faults) {
   if (node_.IsDefined() && !node_.Mark().is_null()) line_ = node_.Mark().line + 1;
 }
 
@@ -55,7 +58,7 @@ YamlNode YamlNode::Optional(std::string_view name) const {
 }
 
 YamlNode YamlNode::Required(std::string_view name, std::string_view what_would_be_right) const {
-  const YamlNode member = Optional(name);
+  YamlNode member = Optional(name);
   // A parent that is itself missing or of the wrong kind has had its fault already.
   if (IsMap() && !member.exists()) member.Fault(fmt::format("missing; {}", what_would_be_right));
   return member;

@@ -24,7 +24,7 @@ struct YamlRange {
 // all faults.
 class YamlNode {
  public:
-  YamlNode(YAML::Node node, std::string key, const std::string& file, RigFileFaults* faults);
+  YamlNode(const YAML::Node& node, std::string key, const std::string& file, RigFileFaults* faults);
 
   bool exists() const { return node_.IsDefined() && !node_.IsNull(); }
   bool IsMap() const { return exists() && node_.IsMap(); }

@@ -79,7 +79,7 @@ class Explanations {
   std::optional<Hypothesis> Without(int omitted) const {
     if (!at_published_) return std::nullopt;
     const SubsetNormal normal = at_published_->Without(omitted);
-    const auto alone = ByReadings(normal, published_, options_);
+    auto alone = ByReadings(normal, published_, options_);
     // Readings that check each other need no prior, which may itself come from a wrong reading.
     if ((alone && normal.rows > 6) || !at_prior_) return alone;
     const auto limited =
