@@ -2,22 +2,22 @@
 // Everything on loopback, in a DDS domain of the test's own.
 #include <algorithm>
 #include <filesystem>
-#include <map>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "devices/replay/run_reader.h"
-#include "idl/cpp/subscriber.h"
 #include "tests/idl/dds_support.h"
 #include "tests/support/process.h"
 #include "tests/support/recorded_run.h"
 #include "tests/support/temp_folder.h"
+#include "tests/system/machine_watcher.h"
 
 namespace tbm {
 namespace {
 
 using dds::test::Eventually;
+using test::MachineWatcher;
 using test::Process;
 using ::testing::HasSubstr;
 using namespace std::chrono_literals;
@@ -77,53 +77,8 @@ class WholeMachine : public ::testing::Test {
   test::TempFolder folder_;
 };
 
-// What a reader on DDS has seen.
-class Watcher {
- public:
-  Watcher()
-      : participant_(Config()),
-        poses_(participant_,
-               [this](const dds::RelativePose& pose, const dds::SampleFacts&) {
-                 const std::lock_guard lock(mutex_);
-                 all_.push_back(pose);
-               }),
-        health_(participant_, [this](const dds::DeviceHealth& health, const dds::SampleFacts&) {
-          const std::lock_guard lock(mutex_);
-          states_[std::string(health.device_id.view())] = health.state;
-        }) {}
-
-  std::vector<dds::RelativePose> Poses() const {
-    const std::lock_guard lock(mutex_);
-    return all_;
-  }
-  std::size_t OkCount() const {
-    const std::lock_guard lock(mutex_);
-    return static_cast<std::size_t>(std::count_if(
-        all_.begin(), all_.end(), [](const auto& pose) { return pose.status == PoseStatus::kOk; }));
-  }
-  bool IsIn(const std::string& device, dds::DeviceState state) const {
-    const std::lock_guard lock(mutex_);
-    const auto known = states_.find(device);
-    return known != states_.end() && known->second == state;
-  }
-
- private:
-  static dds::ParticipantConfig Config() {
-    dds::ParticipantConfig config;
-    config.domain_id = kDomain;
-    config.name = "whole_machine_test";
-    return config;
-  }
-  mutable std::mutex mutex_;
-  std::vector<dds::RelativePose> all_;
-  std::map<std::string, dds::DeviceState> states_;
-  dds::Participant participant_;
-  dds::Subscriber<dds::RelativePose> poses_;
-  dds::Subscriber<dds::DeviceHealth> health_;
-};
-
 TEST_F(WholeMachine, PosesOnDdsHoldAgainstTheSimulatorsTruth) {
-  Watcher watcher;
+  MachineWatcher watcher(kDomain);
   const auto simulator = StartSimulator();
   const auto box = StartBox();
   ASSERT_TRUE(Eventually([&] { return watcher.OkCount() >= 30; }, 20s)) << box->Output();
@@ -156,7 +111,7 @@ TEST_F(WholeMachine, PosesOnDdsHoldAgainstTheSimulatorsTruth) {
 }
 
 TEST_F(WholeMachine, ADeadMachineIsSaidAndARestartedOneIsFoundAgain) {
-  Watcher watcher;
+  MachineWatcher watcher(kDomain);
   auto simulator = StartSimulator();
   const auto box = StartBox();
   ASSERT_TRUE(Eventually([&] { return watcher.OkCount() >= 5; }, 20s)) << box->Output();
@@ -180,7 +135,7 @@ TEST_F(WholeMachine, ADeadMachineIsSaidAndARestartedOneIsFoundAgain) {
 }
 
 TEST_F(WholeMachine, WithADeadMachineItStillEndsWithinSeconds) {
-  Watcher watcher;
+  MachineWatcher watcher(kDomain);
   auto simulator = StartSimulator();
   const auto box = StartBox();
   ASSERT_TRUE(Eventually([&] { return watcher.OkCount() >= 5; }, 20s)) << box->Output();
@@ -195,7 +150,7 @@ TEST_F(WholeMachine, WithADeadMachineItStillEndsWithinSeconds) {
 // Like a power cut for the process: what it had recorded solves with the very same program, and DDS
 // leaves nothing behind.
 TEST_F(WholeMachine, ABoxThatIsKilledLeavesAReadableRecordingAndNoSharedMemory) {
-  Watcher watcher;
+  MachineWatcher watcher(kDomain);
   const auto simulator = StartSimulator();
   const auto box = StartBox();
   ASSERT_TRUE(Eventually([&] { return watcher.OkCount() >= 30; }, 20s)) << box->Output();
