@@ -1,12 +1,16 @@
 // The processes as a user starts them: the simulated machine, the camera box, and a reader on DDS.
 // Everything on loopback, in a DDS domain of the test's own.
 #include <algorithm>
+#include <array>
 #include <filesystem>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 
 #include "devices/replay/run_reader.h"
+#include "pose/base/clock.h"
 #include "tests/idl/dds_support.h"
 #include "tests/support/process.h"
 #include "tests/support/recorded_run.h"
@@ -43,27 +47,29 @@ class WholeMachine : public ::testing::Test {
     test::WriteText(folder_ / "rig.yaml", test::ReadText(example + "rig.yaml"));
   }
 
-  std::unique_ptr<Process> StartSimulator() {
-    auto simulator = std::make_unique<Process>(std::vector<std::string>{TBM_SIM,
-                                                                        "--rig",
-                                                                        folder_ / "rig.yaml",
-                                                                        "--address",
-                                                                        "127.0.0.1",
-                                                                        "--rate",
-                                                                        "10",
-                                                                        "--target-port",
-                                                                        folder_ / "tilt_target",
-                                                                        "--camera-port",
-                                                                        folder_ / "tilt_camera",
-                                                                        "--truth",
-                                                                        folder_ / "truth.csv"});
+  std::unique_ptr<Process> StartSimulator(const std::vector<std::string>& more = {}) {
+    std::vector<std::string> command = {TBM_SIM,
+                                        "--rig",
+                                        folder_ / "rig.yaml",
+                                        "--address",
+                                        "127.0.0.1",
+                                        "--rate",
+                                        "10",
+                                        "--target-port",
+                                        folder_ / "tilt_target",
+                                        "--camera-port",
+                                        folder_ / "tilt_camera",
+                                        "--truth",
+                                        folder_ / "truth.csv"};
+    command.insert(command.end(), more.begin(), more.end());
+    auto simulator = std::make_unique<Process>(command);
     EXPECT_TRUE(Eventually([&] { return simulator->HasLine("ready"); }, 10s))
         << simulator->Output();
     return simulator;
   }
-  std::unique_ptr<Process> StartBox() {
+  std::unique_ptr<Process> StartBox(const std::vector<std::string>& environment = {}) {
     return std::make_unique<Process>(
-        std::vector<std::string>{CAMERA_BOX, folder_ / "camera_box.yaml"});
+        std::vector<std::string>{CAMERA_BOX, folder_ / "camera_box.yaml"}, environment);
   }
   std::string NewestRun() const {
     std::vector<std::string> runs;
@@ -174,6 +180,92 @@ TEST_F(WholeMachine, ABoxThatIsKilledLeavesAReadableRecordingAndNoSharedMemory) 
   const auto next = StartBox();
   const std::size_t before = watcher.OkCount();
   EXPECT_TRUE(Eventually([&] { return watcher.OkCount() >= before + 5; }, 30s)) << next->Output();
+}
+
+TEST_F(WholeMachine, ACameraThatComesLateIsWaitedFor) {
+  MachineWatcher watcher(kDomain);
+  const auto box = StartBox();
+  std::this_thread::sleep_for(3s);
+  const auto simulator = StartSimulator();
+  EXPECT_TRUE(Eventually([&] { return watcher.OkCount() >= 5; }, 20s)) << box->Output();
+}
+
+// The real process with the real camera protocol, its civil clock set by hand: an hour forward, two
+// hours back.
+TEST_F(WholeMachine, SettingTheClockCostsAtMostAMoment) {
+  const std::string library = "/usr/lib/x86_64-linux-gnu/faketime/libfaketime.so.1";
+  if (!std::filesystem::exists(library)) GTEST_SKIP() << library << " is not there: libfaketime";
+  test::WriteText(folder_ / "clock", "+0s\n");
+  MachineWatcher watcher(kDomain);
+  const auto simulator = StartSimulator();
+  const auto box = StartBox({"LD_PRELOAD=" + library,
+                             "FAKETIME_TIMESTAMP_FILE=" + (folder_ / "clock"),
+                             "FAKETIME_NO_CACHE=1",
+                             "FAKETIME_DONT_FAKE_MONOTONIC=1",
+                             "DONT_FAKE_MONOTONIC=1"});
+  ASSERT_TRUE(Eventually([&] { return watcher.OkCount() >= 20; }, 20s)) << box->Output();
+  for (const char* offset : {"+3600s\n", "-3600s\n"}) {
+    const std::size_t before = watcher.OkCount();
+    const std::size_t all_before = watcher.Poses().size();
+    // A file that is written over is empty for a moment.
+    test::WriteText(folder_ / "clock.new", offset);
+    std::filesystem::rename(folder_ / "clock.new", folder_ / "clock");
+    ASSERT_TRUE(Eventually([&] { return watcher.OkCount() >= before + 20; }, 10s)) << box->Output();
+    EXPECT_LE(watcher.Poses().size() - all_before - 20, 8u) << "frames without a good pose";
+  }
+  EXPECT_TRUE(
+      Eventually([&] { return box->Output().find("code=clock_set") != std::string::npos; }));
+  const auto poses = watcher.Poses();
+  const double ahead_s =
+      1e-9 * static_cast<double>(SystemClock().Now().ns - poses.back().sensed_at.ns);
+  EXPECT_NEAR(ahead_s, 3600.0, 5.0) << "the stamps are those of the clock as it is set";
+}
+
+// What a service manager hears.
+TEST_F(WholeMachine, TheServiceManagerIsToldOfStartLifeAndEnd) {
+  const std::string path = folder_ / "notify";
+  const int listener = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  ASSERT_LT(path.size(), sizeof address.sun_path);
+  path.copy(address.sun_path, path.size());
+  ASSERT_EQ(bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  const timeval patience{5, 0};
+  setsockopt(listener, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  const auto next = [&] {
+    std::array<char, 256> text{};
+    const ssize_t size = recv(listener, text.data(), text.size(), 0);
+    return std::string(text.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+  };
+  // No camera, no inclinometer: the process is alive all the same.
+  const auto box = StartBox({"NOTIFY_SOCKET=" + path});
+  EXPECT_EQ(next(), "READY=1\nWATCHDOG=1");
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(next(), "WATCHDOG=1");
+  box->Signal(SIGTERM);
+  std::string last;
+  for (int i = 0; i < 20 && last != "STOPPING=1"; ++i) last = next();
+  EXPECT_EQ(last, "STOPPING=1");
+  EXPECT_EQ(box->Wait(), 0);
+  close(listener);
+}
+
+TEST_F(WholeMachine, TheSelfTestNamesTheLedThatIsOffAndThenTheMissingMachine) {
+  const std::vector<std::string> command = {
+      CAMERA_BOX, "--self-test", "--seconds", "2", folder_ / "camera_box.yaml"};
+  {
+    const auto simulator = StartSimulator({"--hide-led", "P3"});
+    Process self_test(command);
+    EXPECT_EQ(self_test.Wait(), 3);
+    EXPECT_THAT(self_test.Output(), HasSubstr("BAD    LED P3               not seen"));
+    EXPECT_THAT(self_test.Output(), HasSubstr("good   LED P4"));
+    EXPECT_THAT(self_test.Output(), HasSubstr("good   inclinometer target"));
+    EXPECT_THAT(self_test.Output(), HasSubstr("a message of our own comes back"));
+    EXPECT_THAT(self_test.Output(), HasSubstr("The box is not ready."));
+  }
+  Process self_test(command);
+  EXPECT_EQ(self_test.Wait(), 3);
+  EXPECT_THAT(self_test.Output(), HasSubstr("BAD    camera               unreachable"));
+  EXPECT_THAT(self_test.Output(), HasSubstr("BAD    inclinometer camera  port_missing"));
 }
 
 TEST_F(WholeMachine, ABadConfigurationEndsWithCodeTwoAndSaysAllThatIsWrong) {
