@@ -43,6 +43,17 @@ TEST(Accuracy, WithStampsPosesAreInterpolatedOrNearest) {
   EXPECT_EQ(pairs->without_pose, 1u);
 }
 
+TEST(Accuracy, OfTwoFramesWithOneStampTheOneWithAPoseCounts) {
+  for (const auto& poses :
+       {std::vector{NoneAt(100), At(100, 10.0)}, std::vector{At(100, 10.0), NoneAt(100)}}) {
+    const auto pairs = PairUp(poses, {At(100, 2.0)}, kTolerance);
+    ASSERT_TRUE(pairs.has_value());
+    ASSERT_EQ(pairs->observations.size(), 1u);
+    EXPECT_EQ(pairs->observations[0].pairing, Pairing::kExact);
+    EXPECT_DOUBLE_EQ(pairs->observations[0].posed_mm.x(), 10.0);
+  }
+}
+
 TEST(Accuracy, WithoutStampsRowsPairInOrder) {
   std::vector<PlacedPoint> poses = {NoStamp(1), {std::nullopt, std::nullopt, 0}, NoStamp(3)};
   const auto by_row = PairUp(poses, {NoStamp(1), NoStamp(2), NoStamp(3.5)}, kTolerance);
@@ -96,6 +107,12 @@ TEST(Accuracy, AlignmentCountsWhatTheDataGive) {
         {std::nullopt, Pairing::kInOrder, Eigen::Vector3d(i, 0, 0), Eigen::Vector3d(0, i, 0)});
   }
   EXPECT_EQ(AlignRigid(line).degrees_of_freedom, 5);
+  // Off the line by less and by more than a thousandth of its length.
+  for (const auto& [off_mm, degrees] : {std::pair(1e-3, 5), std::pair(1e-2, 6)}) {
+    Pairs nearly = line;
+    nearly.observations[1].surveyed_mm.z() += off_mm;
+    EXPECT_EQ(AlignRigid(nearly).degrees_of_freedom, degrees) << off_mm;
+  }
   Pairs one;
   one.observations.push_back(
       {std::nullopt, Pairing::kInOrder, Eigen::Vector3d(1, 2, 3), Eigen::Vector3d(0, 0, 0)});

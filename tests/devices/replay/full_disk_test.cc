@@ -70,6 +70,26 @@ TEST(FullDisk, RecordingStopsCleanlyAndGoesOnWhenThereIsRoom) {
   EXPECT_TRUE(writer.AddFrame(Timestamp{1000}, image));
 }
 
+TEST(FullDisk, RecordingLeavesTheRoomThatOthersNeed) {
+  const SmallDisk disk;
+  if (!disk.is_mounted()) GTEST_SKIP() << "mounting a small disk needs root";
+  RecorderOptions options;
+  options.folder = disk / "recordings";
+  options.rig_yaml = test::ReadText(TBM_SOURCE_DIR "/tests/data/config_bad/rig_good.yaml");
+  options.free_min_bytes = 300'000;
+  RunWriter writer(options);
+  const std::vector<std::uint8_t> pixels(200 * 150, 77);
+  const ImageView image{pixels.data(), 200, 150, 200, 1, 255};
+  ASSERT_TRUE(writer.Begin(Timestamp{1'790'000'000'000'000'000}, ""));
+  int recorded = 0;
+  while (recorded < 100 && writer.AddFrame(Timestamp{recorded + 1}, image)) ++recorded;
+  EXPECT_EQ(writer.status().state, RecorderState::kDiskFull);
+  EXPECT_GT(recorded, 10);
+  constexpr std::uintmax_t kPage = 4096;  // what the last row may have taken
+  EXPECT_GE(std::filesystem::space(options.folder).available + kPage, 300'000u);
+  EXPECT_FALSE(writer.WantsNewRun()) << "twice the room must be free first";
+}
+
 TEST(FullDisk, BeginOnAFullDiskLeavesNothingBehind) {
   const SmallDisk disk;
   if (!disk.is_mounted()) GTEST_SKIP() << "mounting a small disk needs root";

@@ -36,14 +36,19 @@ OwnedFrame FrameAt(std::int64_t ns, const std::vector<std::uint8_t>& pixels) {
   return owned;
 }
 
-// Noise, which no codec makes small: the disk is slower than the frames come. What a run holds has
-// no gap, and what no run holds is counted.
+// Noise, which no codec makes small: as PNG it is written slower than frames come every 2 ms.
+std::vector<std::uint8_t> Noise() {
+  test::Random random("Recorder.Noise");
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(kWidth) * kHeight);
+  for (std::uint8_t& pixel : pixels) pixel = static_cast<std::uint8_t>(255.0 * random.Unit());
+  return pixels;
+}
+
+// What a run holds has no gap, and what no run holds is counted.
 TEST(Recorder, ADiskThatIsTooSlowLosesCountedFramesBetweenRunsAndNeverInsideOne) {
   constexpr int kFrames = 120;
   const test::TempFolder folder;
-  test::Random random("Recorder.SlowDisk");
-  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(kWidth) * kHeight);
-  for (std::uint8_t& pixel : pixels) pixel = static_cast<std::uint8_t>(255.0 * random.Unit());
+  const std::vector<std::uint8_t> pixels = Noise();
   RecorderOptions options = Options(folder / "runs");
   options.png = true;
   std::uint64_t dropped = 0;
@@ -72,6 +77,34 @@ TEST(Recorder, ADiskThatIsTooSlowLosesCountedFramesBetweenRunsAndNeverInsideOne)
   EXPECT_GE(dropped, 1u);
   EXPECT_GE(runs, 2);
   EXPECT_EQ(recorded + dropped, static_cast<std::size_t>(kFrames));
+}
+
+// From a gap on nothing is taken until the next run begins, however late that is.
+TEST(Recorder, AfterAGapItWaitsForTheNextRun) {
+  const test::TempFolder folder;
+  const std::vector<std::uint8_t> pixels = Noise();
+  RecorderOptions options = Options(folder / "runs");
+  options.png = true;
+  {
+    Recorder recorder(options);
+    OwnedFrame frame = FrameAt(0, pixels);
+    for (int i = 1; i <= 120; ++i) {
+      frame.frame.sensed_at = {i};
+      if (i % 60 == 1 && recorder.WantsNewRun()) {
+        recorder.Begin({std::int64_t{i} * 1'000'000'000}, "");
+      }
+      recorder.Add(frame, PoseReason::kNone);
+      std::this_thread::sleep_for(milliseconds(2));
+    }
+    EXPECT_GE(recorder.status().frames_dropped, 1u);
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "runs")) {
+    const auto run = ReadRun(entry.path());
+    ASSERT_TRUE(run);
+    for (std::size_t i = 1; i < run->frames.size(); ++i) {
+      EXPECT_EQ(run->frames[i].sensed_at.ns, run->frames[i - 1].sensed_at.ns + 1) << entry.path();
+    }
+  }
 }
 
 // Each attempt makes the solver forget what its monitor has gathered.
