@@ -97,8 +97,10 @@ class ListSink final : public MessageSink {
 // A camera that a test can unplug.
 class UnpluggableCamera final : public Camera {
  public:
-  UnpluggableCamera(std::unique_ptr<Camera> camera, std::atomic<bool>* is_plugged)
-      : camera_(std::move(camera)), is_plugged_(is_plugged) {}
+  UnpluggableCamera(std::unique_ptr<Camera> camera,
+                    std::atomic<bool>* is_plugged,
+                    std::atomic<bool>* is_closed)
+      : camera_(std::move(camera)), is_plugged_(is_plugged), is_closed_(is_closed) {}
 
   Result<Frame, CameraFailure> WaitFrame(Duration timeout) override {
     if (*is_plugged_) return camera_->WaitFrame(timeout);
@@ -114,11 +116,15 @@ class UnpluggableCamera final : public Camera {
     }
     return health;
   }
-  void Close() override { camera_->Close(); }
+  void Close() override {
+    camera_->Close();
+    *is_closed_ = true;
+  }
 
  private:
   std::unique_ptr<Camera> camera_;
   std::atomic<bool>* is_plugged_;
+  std::atomic<bool>* is_closed_;
 };
 
 // An inclinometer in which a test can put a fault: an InclinometerFailure, 0 for none.
@@ -165,8 +171,8 @@ class CameraBoxTest : public ::testing::Test {
     motion.tilt_noise_factor = 0.0;
     world_ = std::make_shared<const sim::World>(rig_, motion, sim::Faults{}, clock_.Now());
     BoxParts parts;
-    parts.camera = std::make_unique<UnpluggableCamera>(MakeCamera(config_.camera, clock_, world_),
-                                                       &is_plugged_);
+    parts.camera = std::make_unique<UnpluggableCamera>(
+        MakeCamera(config_.camera, clock_, world_), &is_plugged_, &is_closed_);
     InclinometerSources sources;
     sources.truths["target"] = [world = world_](Timestamp at) {
       return world->TiltReading(sim::TiltSensor::kTarget, at);
@@ -213,6 +219,7 @@ class CameraBoxTest : public ::testing::Test {
   SystemSleeper sleeper_;
   std::shared_ptr<const sim::World> world_;
   std::atomic<bool> is_plugged_{true};
+  std::atomic<bool> is_closed_{false};
   std::atomic<int> target_tilt_fault_{0};
   ListSink sink_;
   std::vector<FrameResult> results_;
@@ -362,6 +369,7 @@ TEST_F(CameraBoxTest, StopsWithinASecondAndWithoutAnAlarm) {
   const auto asked = std::chrono::steady_clock::now();
   stop.request_stop();
   thread.join();
+  EXPECT_TRUE(is_closed_) << "a camera left running goes on sending";
   EXPECT_LT(std::chrono::steady_clock::now() - asked, std::chrono::seconds(2));
   for (const dds::Event& event : sink_.events) {
     EXPECT_FALSE(event.active && event.severity == dds::Severity::kAlarm) << event.text.view();
