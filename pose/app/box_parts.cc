@@ -1,5 +1,6 @@
 #include "pose/app/box_parts.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -19,6 +20,8 @@ RecorderOptions RecorderOptionsOf(const BoxConfig& config, std::string rig_yaml)
   options.rig_yaml = std::move(rig_yaml);
   options.run_max_duration = config.recording.run_length;
   options.total_max_bytes = config.recording.limit_bytes;
+  // A power cut costs a second at the most.
+  options.sync_every_frames = std::max(1, static_cast<int>(config.camera.frame_rate_hz));
   return options;
 }
 
