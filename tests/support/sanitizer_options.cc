@@ -25,7 +25,13 @@ extern "C" const char* __tsan_default_suppressions() {
 
 #endif
 
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(__has_feature)  // clang's way to say what GCC says by __SANITIZE_ADDRESS__
+#if __has_feature(address_sanitizer)
+#define TBM_UNDER_ASAN
+#endif
+#endif
+
+#if defined(__SANITIZE_ADDRESS__) || defined(TBM_UNDER_ASAN)
 
 extern "C" const char* __asan_default_options();
 extern "C" const char* __asan_default_options() {
