@@ -12,6 +12,7 @@ import sys
 import tempfile
 
 POSIX = {"signal.h", "fcntl.h", "poll.h", "termios.h", "unistd.h", "sys", "pty.h", "arpa", "netinet", "net", "ifaddrs.h"}
+VECTOR_UNIT = {"emmintrin.h", "arm_neon.h"}
 POSE = {"pose/base", "pose/geometry", "pose/rig/rig.h"}
 POSE_ALL = {"pose/base", "pose/geometry", "pose/rig", "pose/centres", "pose/solve", "pose/frame"}
 
@@ -19,11 +20,11 @@ POSE_ALL = {"pose/base", "pose/geometry", "pose/rig", "pose/centres", "pose/solv
 ALLOWED = {
     "pose/base": set(),
     "pose/geometry": {"Eigen", "pose/base"},
-    "pose/centres": {"Eigen", *POSE, "pose/solve"},
+    "pose/centres": {"Eigen", *POSE, "pose/solve", *VECTOR_UNIT},
     "pose/solve": {"Eigen", *POSE, "ceres"},
     "pose/rig": {"Eigen", "pose/base", "pose/geometry", "yaml-cpp", "fmt"},
     "pose/frame": {"Eigen", *POSE, "pose/centres", "pose/solve"},
-    "pose/app": {"Eigen", *POSE_ALL, "devices", "idl/cpp", "fmt", "CLI", "yaml-cpp", "openssl", *POSIX},
+    "pose/app": {"Eigen", *POSE_ALL, "devices", "idl/cpp", "fmt", "CLI", "yaml-cpp", "openssl", "systemd", *POSIX},
     "devices/bus": {"pose/base", *POSIX},
     "devices/camera": {"Eigen", *POSE, "pose/centres", "devices/bus", "devices/sim", "devices/replay", "arv.h", "fmt", *POSIX},
     "devices/inclinometer": {"pose/base", "pose/geometry", "devices/bus", "devices/sim", "modbus", "fmt", *POSIX},
@@ -39,6 +40,8 @@ PURE = {"pose/base", "pose/geometry", "pose/centres", "pose/solve", "pose/frame"
 EFFECTS = {"condition_variable", "filesystem", "fstream", "future", "iostream", "mutex", "thread", "ctime", "random"}
 # One file alone may know a library that its folder may not.
 ONLY_IN = {"ceres": {"pose/solve/penalty_pose.cc"},
+           "systemd": {"pose/app/service_manager.cc"},
+           **{header: {"pose/centres/vectors.h"} for header in VECTOR_UNIT},
            "arv.h": {"devices/camera", "devices/app"},
            "yaml-cpp": {"pose/rig", "pose/app", "guidance/config", "devices/app"}}
 

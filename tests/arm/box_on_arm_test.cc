@@ -20,6 +20,7 @@
 #include "tests/support/process.h"
 #include "tests/support/recorded_run.h"
 #include "tests/support/temp_folder.h"
+#include "tests/system/example_config.h"
 #include "tests/system/machine_watcher.h"
 
 namespace tbm {
@@ -35,12 +36,6 @@ using namespace std::chrono_literals;
 constexpr int kDomain = 161;
 const std::string kArmTree = TBM_SOURCE_DIR "/build/arm/tree";
 const std::string kSysroot = TBM_SOURCE_DIR "/build/arm/sysroot";
-
-std::string Replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return at == std::string::npos ? text : text.replace(at, from.size(), to);
-}
 
 // Before any thread: what the emulated box sends by multicast must not leave this computer.
 class OwnNetwork final : public ::testing::Environment {
@@ -82,14 +77,7 @@ class BoxOnArm : public ::testing::Test {
     if (!std::filesystem::exists(kArmTree + "/bin/camera_box")) {
       GTEST_SKIP() << "no box to run: tools/arm/build makes it";
     }
-    const std::string example = TBM_SOURCE_DIR "/pose/app/example/";
-    std::string config = test::ReadText(example + "camera_box.yaml");
-    config = Replaced(config, "domain: 25", "domain: " + std::to_string(kDomain));
-    config = Replaced(config, "# folder: runs", "folder: runs");
-    config = Replaced(config, "port: tilt_target", "port: " + (folder_ / "tilt_target"));
-    config = Replaced(config, "port: tilt_camera", "port: " + (folder_ / "tilt_camera"));
-    test::WriteText(folder_ / "camera_box.yaml", config);
-    test::WriteText(folder_ / "rig.yaml", test::ReadText(example + "rig.yaml"));
+    test::WriteExampleConfig(folder_, kDomain);
 
     const auto loaded = LoadRigFile(folder_ / "rig.yaml");
     ASSERT_TRUE(loaded.has_value());

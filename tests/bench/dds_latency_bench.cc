@@ -7,6 +7,7 @@
 //
 //   dds_latency_bench [samples of each]
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -216,7 +217,9 @@ class FramePath final : public MessageSink {
   void FrameIn() {
     frame_.frame_number = static_cast<std::uint64_t>(SteadyNs());
     frame_.sensed_at.ns += 100'000'000;
+    const std::int64_t began = SteadyNs();
     mailbox_.Put(frame_);
+    copied_ns_ = SteadyNs() - began;
   }
   // Of each frame: copy, find, assign, solve, bound, message. After the thread has ended.
   std::vector<std::int64_t> End() {
@@ -241,7 +244,7 @@ class FramePath final : public MessageSink {
     pose.sample_number = frame.frame_number;
     pose.published_at = frame.sensed_at;
     queue_.Publish(pose);
-    computed_ns_.push_back(SteadyNs() - began);
+    computed_ns_.push_back(SteadyNs() - began + copied_ns_);
   }
 
   Publisher<RelativePose>& publisher_;
@@ -253,6 +256,7 @@ class FramePath final : public MessageSink {
   FrameMailbox mailbox_;
   QueuedSink queue_;
   std::vector<std::int64_t> computed_ns_;
+  std::atomic<std::int64_t> copied_ns_{0};  // of the latest frame
   std::jthread thread_;
 };
 

@@ -15,6 +15,7 @@
 #include "tests/support/process.h"
 #include "tests/support/recorded_run.h"
 #include "tests/support/temp_folder.h"
+#include "tests/system/example_config.h"
 #include "tests/system/machine_watcher.h"
 
 namespace tbm {
@@ -28,24 +29,9 @@ using namespace std::chrono_literals;
 
 constexpr int kDomain = 160;
 
-std::string Replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return at == std::string::npos ? text : text.replace(at, from.size(), to);
-}
-
 class WholeMachine : public ::testing::Test {
  protected:
-  WholeMachine() {
-    const std::string example = TBM_SOURCE_DIR "/pose/app/example/";
-    std::string config = test::ReadText(example + "camera_box.yaml");
-    config = Replaced(config, "domain: 25", "domain: " + std::to_string(kDomain));
-    config = Replaced(config, "# folder: runs", "folder: runs");
-    config = Replaced(config, "port: tilt_target", "port: " + (folder_ / "tilt_target"));
-    config = Replaced(config, "port: tilt_camera", "port: " + (folder_ / "tilt_camera"));
-    test::WriteText(folder_ / "camera_box.yaml", config);
-    test::WriteText(folder_ / "rig.yaml", test::ReadText(example + "rig.yaml"));
-  }
+  WholeMachine() { test::WriteExampleConfig(folder_, kDomain); }
 
   std::unique_ptr<Process> StartSimulator(const std::vector<std::string>& more = {}) {
     std::vector<std::string> command = {TBM_SIM,
@@ -270,8 +256,8 @@ TEST_F(WholeMachine, TheSelfTestNamesTheLedThatIsOffAndThenTheMissingMachine) {
 
 TEST_F(WholeMachine, ABadConfigurationEndsWithCodeTwoAndSaysAllThatIsWrong) {
   std::string config = test::ReadText(folder_ / "camera_box.yaml");
-  config = Replaced(config, "frame_rate_hz: 10", "frame_rate_hz: fast");
-  config = Replaced(config, "driver: modbus  ", "driver: modbux  ");
+  config = test::Replaced(config, "frame_rate_hz: 10", "frame_rate_hz: fast");
+  config = test::Replaced(config, "driver: modbus  ", "driver: modbux  ");
   test::WriteText(folder_ / "camera_box.yaml", config);
   const auto box = StartBox();
   EXPECT_EQ(box->Wait(), 2);
