@@ -3,26 +3,33 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <limits>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "pose/base/check.h"
-#include "pose/centres/any_above.h"
+#include "pose/centres/elementary.h"
 #include "pose/centres/image_levels.h"
 #include "pose/centres/label_runs.h"
 #include "pose/centres/measure_spot.h"
 #include "pose/centres/split_blobs.h"
+#include "pose/centres/vectors.h"
 
 namespace tbm {
 namespace {
 
-constexpr int kBlockHeight = 8;
-constexpr std::size_t kPiecesPerBlock = kBlockWidth / LevelMap::kPieceWidth;
-static_assert(kPiecesPerBlock == 4);
+constexpr int kBlockWidth = LevelMap::kBlockWidth;
+constexpr int kBlockHeight = LevelMap::kBlockHeight;
 constexpr std::size_t kMaxRuns = 32768;
 constexpr std::size_t kMaxNeighbours = 8;
 constexpr int kMaxRounds = 10;       // of correcting neighbours for each other's light
-constexpr double kSettledPx = 5e-4;  // a round that moves nothing further is the last
+constexpr double kSettledPx = 5e-4;  // what moves no further does not disturb its neighbours
+// With more spots than this, those that hardly overlap are measured once.
+constexpr std::size_t kCrowd = 24;
+// Twice as many as can be reported: among the brighter ones some turn out to be no spots.
+constexpr std::size_t kMaxCandidates = 2 * kMaxCentres;
 
 // What rises less than this above its surroundings is no lamp: pipes, wet walls.
 constexpr double kLowestOffset = 1.0 / 28.0;  // of full scale
@@ -31,14 +38,22 @@ constexpr double kAssumedWellElectrons = 10000.0;
 constexpr double kLargestWellElectrons = 100000.0;
 // Shape misfit, as a share of the spot's light, beyond which it is no spot.
 constexpr double kLargestMisfit = 0.3;
+// A guess of the spread is too large by some percent, never too small by as much.
+constexpr double kNarrowGuess = 1.0;
+constexpr double kLongGuess = 1.3;
 
 struct Candidate {
   SpotGuess guess;
-  SpotFit fit;
-  bool failed = false;
-  double moved_px = 0.0;  // in the last round, when the neighbours' light was corrected
-  double left_px = 0.0;   // to go, if the rounds went on to shrink as the last two did
-  double overlap = 0.0;   // of the neighbours' light, see Overlap
+  SpotFit fit;  // of the guess, until measured
+  bool measured = false;
+  bool gone = false;       // no spot, or another candidate's
+  bool unsettled = false;  // moved in the last round, so that its neighbours' light changed
+  double moved_px = 0.0;   // in the last round, when the neighbours' light was corrected
+  double left_px = 0.0;    // to go, if the rounds went on to shrink as the last two did
+  double overlap = 0.0;    // of the neighbours' light, see Overlap
+  // Whose light falls into the window or the frame around it.
+  std::array<std::uint16_t, kMaxNeighbours> neighbours{};
+  std::uint16_t neighbour_count = 0;
 };
 
 SpotFit AsFit(const SpotGuess& guess) {
@@ -50,15 +65,30 @@ SpotFit AsFit(const SpotGuess& guess) {
   return fit;
 }
 
-bool Near(const SpotFit& a, const SpotFit& b) {
-  const double reach =
-      5.0 * (std::max(a.sigma_u_px, a.sigma_v_px)) + 4.0 * std::max(b.sigma_u_px, b.sigma_v_px);
-  return std::abs(a.u_px - b.u_px) < reach && std::abs(a.v_px - b.v_px) < reach;
+bool Near(const SpotGuess& a, const SpotGuess& b) {
+  const double reach = 5.5 * a.spread_px + 4.5 * b.spread_px;
+  return std::abs(a.v_px - b.v_px) < reach && std::abs(a.u_px - b.u_px) < reach;
 }
 
+double SquaredDistance(const SpotFit& a, const SpotFit& b) {
+  const double du = a.u_px - b.u_px;
+  const double dv = a.v_px - b.v_px;
+  return du * du + dv * dv;
+}
+
+// Whether the light of one falls on pixels that say where the other is: the product of both, in
+// their common middle, is more than 1e-4 of their heights.
+bool Overlapping(const SpotFit& a, const SpotFit& b) {
+  const double mean2 = 0.5 * (a.sigma_u_px * a.sigma_v_px + b.sigma_u_px * b.sigma_v_px);
+  return SquaredDistance(a, b) < 36.0 * mean2;
+}
+
+// Towards zero below -0.5, which no place in an image is.
+int Rounded(double px) { return static_cast<int>(px + 0.5); }
+
 double PixelAt(const ImageView& image, double u_px, double v_px) {
-  const int u = std::clamp(static_cast<int>(std::lround(u_px)), 0, image.width_px - 1);
-  const int v = std::clamp(static_cast<int>(std::lround(v_px)), 0, image.height_px - 1);
+  const int u = std::clamp(Rounded(u_px), 0, image.width_px - 1);
+  const int v = std::clamp(Rounded(v_px), 0, image.height_px - 1);
   const std::byte* at = static_cast<const std::byte*>(image.pixels) + v * image.stride_bytes +
                         static_cast<std::ptrdiff_t>(u) * image.bytes_per_pixel;
   return image.bytes_per_pixel == 1 ? LoadPixel<std::uint8_t>(at) : LoadPixel<std::uint16_t>(at);
@@ -100,10 +130,8 @@ double Overlap(const SpotFit& fit, std::span<const SpotFit* const> others) {
   const double spread2 = fit.sigma_u_px * fit.sigma_v_px;
   for (const SpotFit* other : others) {
     const double mean2 = 0.5 * (spread2 + other->sigma_u_px * other->sigma_v_px);
-    const double du = fit.u_px - other->u_px;
-    const double dv = fit.v_px - other->v_px;
-    const double apart2 = (du * du + dv * dv) / mean2;
-    overlap += 2.0 * apart2 * std::exp(-0.25 * apart2);
+    const double apart2 = SquaredDistance(fit, *other) / mean2;
+    overlap += 2.0 * apart2 * DecayOf(0.25 * apart2);
   }
   return overlap;
 }
@@ -117,6 +145,8 @@ Stretch StretchOf(const SpotFit& fit) {
   return {fit.moment_uu_px2 - fit.moment_vv_px2, 2.0 * fit.moment_uv_px2};
 }
 
+double Length(double a, double b) { return std::sqrt(a * a + b * b); }
+
 }  // namespace
 
 struct CentreFinder::WorkSpace {
@@ -124,7 +154,7 @@ struct CentreFinder::WorkSpace {
       : labeller(kMaxRuns),
         splitter(kMaxRuns),
         meter(options.min_spread_px, options.max_spread_px) {
-    candidates.reserve(splitter.guesses().capacity());
+    candidates.reserve(kMaxCandidates);
     order.reserve(candidates.capacity());
     sorted.reserve(candidates.capacity());
   }
@@ -136,22 +166,27 @@ struct CentreFinder::WorkSpace {
   std::vector<Candidate> candidates;
   std::vector<std::size_t> order;
   std::vector<double> sorted;
-  std::vector<int> thresholds;        // of a strip of blocks, per piece
-  std::vector<int> lowest_threshold;  // of each block
   std::vector<std::size_t> bright_blocks;
   FoundCentres found;
   double offset_dn = 0.0;  // of the threshold above the level
   double gain = 0.0;
+  bool is_crowd = false;
 
   template <class Pixel>
   void ScanImage(const ImageView& image);
-  void SetThresholds(float v_px);
   template <class Pixel>
-  void ScanRow(const std::byte* row_start, int row, const ImageView& image);
+  void FindBrightBlocks(const std::byte* first,
+                        const ImageView& image,
+                        int rows,
+                        std::span<const int> thresholds);
   std::size_t CollectGuesses(const ImageView& image, const FinderOptions& options);
+  void ChooseCandidates(const ImageView& image, const FinderOptions& options);
   void MeasureAll(const ImageView& image, const FinderOptions& options);
-  double MeasureRound(const ImageView& image, const SensorNoise& noise, bool first);
+  void FindNeighbours();
   void DropDoubles(double closer_than_spreads);
+  void MeasureFirst(const ImageView& image, const SensorNoise& noise);
+  void MeasureAgain(const ImageView& image, const SensorNoise& noise);
+  bool Measure(const ImageView& image, const SensorNoise& noise, Candidate& candidate);
   double MedianOfSorted();
   void EstimateGain(const FinderOptions& options, double full_dn);
   Stretch CommonStretch();
@@ -169,7 +204,8 @@ Result<const FoundCentres*, ImageFailure> CentreFinder::Find(const ImageView& im
   TBM_CHECK(image.width_px >= 0 && image.height_px >= 0 && image.max_value > 0);
   TBM_CHECK(image.stride_bytes >= std::ptrdiff_t{image.bytes_per_pixel} * image.width_px);
   WorkSpace& work = *work_;
-  work.bright_blocks.reserve(static_cast<std::size_t>(image.width_px / kBlockWidth + 1));
+  const auto blocks = static_cast<std::size_t>(image.width_px / kBlockWidth + 1);
+  work.bright_blocks.reserve(blocks);
   work.found.centres.clear();
   work.found.levels = {};
   if (image.width_px == 0 || image.height_px == 0) return Failure{ImageFailure::kDark};
@@ -200,58 +236,77 @@ Result<const FoundCentres*, ImageFailure> CentreFinder::Find(const ImageView& im
   return &work.found;
 }
 
-// The one pass over the image: the brightest pixel of each block against the lowest threshold of
-// its pieces. Only blocks that exceed it are looked at again, while they are in the cache.
+// The one pass over the image: the brightest pixels of each block against its threshold. Only
+// blocks that exceed it are looked at again, while they are in the cache.
 template <class Pixel>
 void CentreFinder::WorkSpace::ScanImage(const ImageView& image) {
-  static_assert(LevelMap::kTileSize == kBlockWidth);
   const auto* first = static_cast<const std::byte*>(image.pixels);
+  const int highest =
+      static_cast<int>(std::min<std::uint32_t>(image.max_value, std::numeric_limits<Pixel>::max()));
+  const int columns = image.width_px / kBlockWidth * kBlockWidth;
+  std::span<const int> thresholds;
   for (int row = 0; row < image.height_px; row += kBlockHeight) {
     const int rows = std::min(kBlockHeight, image.height_px - row);
-    SetThresholds(static_cast<float>(row) + 0.5f * static_cast<float>(rows - 1));
-    bright_blocks.clear();
-    for (int column = 0; column < image.width_px; column += kBlockWidth) {
-      const int columns = std::min(kBlockWidth, image.width_px - column);
-      const std::byte* at = first + row * image.stride_bytes + column * int{sizeof(Pixel)};
-      const auto block = static_cast<std::size_t>(column / kBlockWidth);
-      const int threshold = lowest_threshold[block];
-      const bool bright =
-          columns == kBlockWidth
-              ? AnyAbove<Pixel>(at, image.stride_bytes, rows, threshold)
-              : AnyAbovePlain<Pixel>(at, image.stride_bytes, columns, rows, threshold);
-      if (bright) bright_blocks.push_back(block);
-    }
-    for (int y = row; y < row + rows && !bright_blocks.empty(); ++y) {
-      ScanRow<Pixel>(first + y * image.stride_bytes, y, image);
+    if (row % (2 * kBlockHeight) == 0) thresholds = levels.Thresholds(row, offset_dn, highest);
+    FindBrightBlocks<Pixel>(first + row * image.stride_bytes, image, rows, thresholds);
+    const bool has_rest = columns < image.width_px;
+    if (bright_blocks.empty() && !has_rest) continue;
+    for (int y = row; y < row + rows; ++y) {
+      const std::byte* row_start = first + y * image.stride_bytes;
+      for (const std::size_t block : bright_blocks) {
+        const int column = static_cast<int>(block) * kBlockWidth;
+        const int threshold = thresholds[block];
+        const std::uint32_t bits = vectors::BitsAbove(row_start + column * int{sizeof(Pixel)},
+                                                      static_cast<Pixel>(threshold));
+        labeller.AddBits(y, column, bits, threshold);
+      }
+      if (!has_rest) continue;
+      labeller.Scan<Pixel>(image, y, columns, image.width_px, thresholds[columns / kBlockWidth]);
     }
   }
 }
 
-void CentreFinder::WorkSpace::SetThresholds(float v_px) {
-  const std::span<const float> level = levels.AlongRow(v_px);
-  thresholds.resize(level.size());
-  lowest_threshold.resize(level.size() / kPiecesPerBlock);
-  for (std::size_t i = 0; i < level.size(); ++i) {
-    thresholds[i] = static_cast<int>(level[i] + static_cast<float>(offset_dn));
-  }
-  for (std::size_t i = 0; i < lowest_threshold.size(); ++i) {
-    const int* piece = &thresholds[i * kPiecesPerBlock];
-    lowest_threshold[i] = std::min(std::min(piece[0], piece[1]), std::min(piece[2], piece[3]));
-  }
-}
-
+// Among the whole blocks of one strip. Asks the vector unit once for kGroup blocks: an answer takes
+// it longer than folding a block.
 template <class Pixel>
-void CentreFinder::WorkSpace::ScanRow(const std::byte* row_start, int row, const ImageView& image) {
-  for (const std::size_t block : bright_blocks) {
-    const int column = static_cast<int>(block) * kBlockWidth;
-    for (std::size_t piece = 0; piece < kPiecesPerBlock; ++piece) {
-      constexpr int kPiece = LevelMap::kPieceWidth;
-      const int begin = column + static_cast<int>(piece) * kPiece;
-      const int end = std::min(begin + kPiece, image.width_px);
-      const int threshold = thresholds[block * kPiecesPerBlock + piece];
-      const std::byte* at = row_start + begin * int{sizeof(Pixel)};
-      if (end - begin == kPiece && !AnyAbove<Pixel, kPiece>(at, 0, 1, threshold)) continue;
-      labeller.Scan<Pixel>(row_start, row, begin, end, threshold, image.max_value);
+void CentreFinder::WorkSpace::FindBrightBlocks(const std::byte* first,
+                                               const ImageView& image,
+                                               int rows,
+                                               std::span<const int> thresholds) {
+  using namespace vectors;
+  constexpr std::size_t kGroup = 8;
+  constexpr std::size_t kRegister = 16;
+  constexpr std::size_t kBlockBytes = std::size_t{kBlockWidth} * sizeof(Pixel);
+  const auto blocks = static_cast<std::size_t>(image.width_px / kBlockWidth);
+  const std::ptrdiff_t stride_bytes = image.stride_bytes;
+  std::array<std::byte, kGroup * kRegister> flags;
+  bright_blocks.clear();
+  for (std::size_t group = 0; group < blocks; group += kGroup) {
+    const std::size_t end = std::min(group + kGroup, blocks);
+    auto any = SpreadPixel(Pixel{0});
+    std::byte* flag = flags.data();
+    const auto compare = [&](const Pixels<Pixel>& best, std::size_t block) {
+      const auto above = Above(best, SpreadPixel(static_cast<Pixel>(thresholds[block])));
+      StorePixels(flag, above);
+      flag += kRegister;
+      any = Brighter(any, above);
+    };
+    std::size_t pair = group;
+    for (; pair + 1 < end; pair += 2) {
+      const auto best = BrightestOfBlocks<Pixel>(first, stride_bytes, rows);
+      compare(best.left, pair);
+      compare(best.right, pair + 1);
+      first += 2 * kBlockBytes;
+    }
+    if (pair < end) {
+      compare(BrightestOfBlock<Pixel>(first, stride_bytes, rows), pair);
+      first += kBlockBytes;
+    }
+    if (!AnyLane(any)) continue;
+    for (std::size_t block = group; block < end; ++block) {
+      std::array<std::uint32_t, 4> words;
+      std::memcpy(words.data(), &flags[(block - group) * kRegister], sizeof words);
+      if ((words[0] | words[1] | words[2] | words[3]) != 0) bright_blocks.push_back(block);
     }
   }
 }
@@ -267,20 +322,51 @@ std::size_t CentreFinder::WorkSpace::CollectGuesses(const ImageView& image,
       options.gain_dn_per_electron.value_or(full_dn / kAssumedWellElectrons);
   std::size_t blobs = 0;
   splitter.guesses().clear();
-  for (const Blob& blob : labeller.Finish()) {
-    const float level = levels.At(static_cast<float>(blob.u_px()), static_cast<float>(blob.v_px()));
+  for (const Blob& blob : labeller.Finish(image, MostSpotPixels(options.max_spread_px))) {
+    if (blob.pixels < Blob::kFewestPixels) {
+      ++found.levels.rejected_spots;
+      continue;
+    }
+    const float level = levels.At(0.5f * static_cast<float>(blob.left + blob.right),
+                                  0.5f * static_cast<float>(blob.top + blob.bottom));
     RaisedBlob raised{blob, static_cast<double>(level), offset_dn};
     raised.offset_dn = std::floor(raised.background_dn + offset_dn) + 0.5 - raised.background_dn;
     raised.offset_dn = std::max(raised.offset_dn, 0.5);
     const SpotGuess guess = GuessSpot(raised, image.max_value);
-    if (blob.pixels < 3 || guess.spread_px < 0.55 * options.min_spread_px) {
+    if (guess.spread_px < kNarrowGuess * options.min_spread_px) {
       ++found.levels.rejected_spots;
       continue;
     }
     ++blobs;
-    if (!splitter.Split(image, raised, split)) ++found.levels.dropped_spots;
+    if (!splitter.Split(image, raised, guess, split)) ++found.levels.dropped_spots;
   }
   return blobs;
+}
+
+// Brightest first.
+void CentreFinder::WorkSpace::ChooseCandidates(const ImageView& image,
+                                               const FinderOptions& options) {
+  std::vector<SpotGuess>& guesses = splitter.guesses();
+  std::sort(guesses.begin(), guesses.end(), [](const SpotGuess& a, const SpotGuess& b) {
+    return std::tie(b.amplitude_dn, a.v_px, a.u_px) < std::tie(a.amplitude_dn, b.v_px, b.u_px);
+  });
+  candidates.clear();
+  for (const SpotGuess& guess : guesses) {
+    if (candidates.size() == kMaxCandidates) {
+      ++found.levels.dropped_spots;
+      continue;
+    }
+    if (guess.spread_px > 1.5 * options.max_spread_px ||
+        guess.elongation > kLongGuess * options.max_elongation ||
+        !StandsOut(image, guess, 0.7 * options.min_snr * found.levels.noise_dn)) {
+      ++found.levels.rejected_spots;
+      continue;
+    }
+    Candidate candidate;
+    candidate.guess = guess;
+    candidate.fit = AsFit(guess);
+    candidates.push_back(candidate);
+  }
 }
 
 void CentreFinder::WorkSpace::MeasureAll(const ImageView& image, const FinderOptions& options) {
@@ -292,76 +378,118 @@ void CentreFinder::WorkSpace::MeasureAll(const ImageView& image, const FinderOpt
     const double read = *options.read_noise_dn;
     noise.dark_variance_dn2 = std::max(noise.dark_variance_dn2, read * read + 1.0 / 12.0);
   }
-  candidates.clear();
-  for (const SpotGuess& guess : splitter.guesses()) {
-    if (guess.spread_px > 1.5 * options.max_spread_px ||
-        !StandsOut(image, guess, 0.7 * options.min_snr * found.levels.noise_dn)) {
-      ++found.levels.rejected_spots;
-      continue;
-    }
-    candidates.push_back({guess, AsFit(guess)});
-  }
+  ChooseCandidates(image, options);
+  is_crowd = candidates.size() > kCrowd;
+  FindNeighbours();
   DropDoubles(1.2);
-  MeasureRound(image, noise, true);
+  MeasureFirst(image, noise);
   DropDoubles(0.7);
-  for (int round = 0; round < kMaxRounds; ++round) {
-    if (MeasureRound(image, noise, false) < kSettledPx) break;
-  }
+  MeasureAgain(image, noise);
   DropDoubles(0.7);
+  std::erase_if(candidates, [](const Candidate& c) { return c.gone || !c.measured; });
   EstimateGain(options, full_dn);
 }
 
-// Two guesses can lead to one spot; the later one goes.
-void CentreFinder::WorkSpace::DropDoubles(double closer_than_spreads) {
+void CentreFinder::WorkSpace::FindNeighbours() {
+  const auto add = [](Candidate& to, std::size_t neighbour) {
+    if (to.neighbour_count == kMaxNeighbours) return;
+    to.neighbours[to.neighbour_count++] = static_cast<std::uint16_t>(neighbour);
+  };
   for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const SpotFit& a = candidates[i].fit;
-    std::erase_if(candidates, [&](const Candidate& other) {
-      const SpotFit& b = other.fit;
-      return &other > &candidates[i] &&
-             std::hypot(a.u_px - b.u_px, a.v_px - b.v_px) <
-                 closer_than_spreads * std::min(a.sigma_u_px, b.sigma_u_px);
-    });
+    for (std::size_t j = i + 1; j < candidates.size(); ++j) {
+      const SpotGuess& a = candidates[i].guess;
+      const SpotGuess& b = candidates[j].guess;
+      if (Near(a, b)) add(candidates[i], j);
+      if (Near(b, a)) add(candidates[j], i);
+    }
   }
 }
 
-// Each spot without the light of the others in its window, as far as they are known by now. The
-// first round measures all, further ones only those that have such neighbours. Returns the
-// longest way that any has moved [px].
-double CentreFinder::WorkSpace::MeasureRound(const ImageView& image,
-                                             const SensorNoise& noise,
-                                             bool first) {
-  double longest_px = 0.0;
-  for (Candidate& candidate : candidates) {
-    std::array<const SpotFit*, kMaxNeighbours> others;
-    std::size_t count = 0;
-    for (const Candidate& other : candidates) {
-      if (count == kMaxNeighbours) break;
-      if (&other == &candidate || other.failed || !Near(candidate.fit, other.fit)) continue;
-      others[count++] = &other.fit;
-    }
-    if (!first && count == 0) continue;
-    SpotGuess start = candidate.guess;
-    start.u_px = candidate.fit.u_px;
-    start.v_px = candidate.fit.v_px;
-    start.amplitude_dn = candidate.fit.amplitude_dn;
-    start.spread_px = std::sqrt(candidate.fit.sigma_u_px * candidate.fit.sigma_v_px);
-    SpotFit fit;
-    const auto neighbours = std::span(others).first(count);
-    if (meter.Measure(image, start, noise, neighbours, &fit) == SpotVerdict::kMeasured) {
-      const double moved_px = std::hypot(fit.u_px - start.u_px, fit.v_px - start.v_px);
-      const double rate = std::clamp(moved_px / std::max(candidate.moved_px, 1e-9), 0.5, 0.95);
-      candidate.left_px = first ? 0.0 : moved_px * rate / (1.0 - rate);
-      candidate.moved_px = moved_px;
-      candidate.overlap = Overlap(fit, neighbours);
-      longest_px = std::max(longest_px, moved_px);
-      candidate.fit = fit;
-    } else {
-      candidate.failed = first;
+// Two guesses can lead to one spot; the fainter one goes.
+void CentreFinder::WorkSpace::DropDoubles(double closer_than_spreads) {
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    Candidate& candidate = candidates[i];
+    if (candidate.gone) continue;
+    for (std::size_t n = 0; n < candidate.neighbour_count; ++n) {
+      if (candidate.neighbours[n] < i) continue;
+      Candidate& other = candidates[candidate.neighbours[n]];
+      const double closest =
+          closer_than_spreads * std::min(candidate.fit.sigma_u_px, other.fit.sigma_u_px);
+      if (SquaredDistance(candidate.fit, other.fit) < closest * closest) other.gone = true;
     }
   }
-  const auto failed = std::erase_if(candidates, [](const Candidate& c) { return c.failed; });
-  found.levels.rejected_spots += static_cast<int>(failed);
-  return longest_px;
+}
+
+// The brightest that are spots, as many as can be reported; each without the light of the others
+// in its window, as far as they are known by now.
+void CentreFinder::WorkSpace::MeasureFirst(const ImageView& image, const SensorNoise& noise) {
+  std::size_t measured = 0;
+  for (Candidate& candidate : candidates) {
+    if (candidate.gone) continue;
+    if (measured == kMaxCentres) {
+      ++found.levels.dropped_spots;
+      continue;
+    }
+    candidate.measured = Measure(image, noise, candidate);
+    candidate.gone = !candidate.measured;
+    candidate.unsettled = true;
+    candidate.left_px = 0.0;
+    measured += candidate.measured;
+    found.levels.rejected_spots += candidate.gone;
+  }
+}
+
+// Spots in each other's windows in turn, until none moves.
+void CentreFinder::WorkSpace::MeasureAgain(const ImageView& image, const SensorNoise& noise) {
+  for (int round = 0; round < kMaxRounds; ++round) {
+    bool any = false;
+    for (Candidate& candidate : candidates) {
+      if (candidate.gone || !candidate.measured) continue;
+      bool disturbed = false;
+      for (std::size_t n = 0; n < candidate.neighbour_count; ++n) {
+        const Candidate& other = candidates[candidate.neighbours[n]];
+        if (!other.unsettled) continue;
+        disturbed |= Overlapping(candidate.fit, other.fit) || (round == 0 && !is_crowd);
+      }
+      if (!disturbed) {
+        if (round > 0) candidate.unsettled = false;
+        continue;
+      }
+      any = true;
+      (void)Measure(image, noise, candidate);
+      candidate.unsettled = candidate.moved_px > kSettledPx;
+    }
+    if (!any) return;
+  }
+}
+
+bool CentreFinder::WorkSpace::Measure(const ImageView& image,
+                                      const SensorNoise& noise,
+                                      Candidate& candidate) {
+  std::array<const SpotFit*, kMaxNeighbours> others;
+  std::size_t count = 0;
+  for (std::size_t n = 0; n < candidate.neighbour_count; ++n) {
+    const Candidate& other = candidates[candidate.neighbours[n]];
+    if (!other.gone) others[count++] = &other.fit;
+  }
+  SpotGuess start = candidate.guess;
+  start.u_px = candidate.fit.u_px;
+  start.v_px = candidate.fit.v_px;
+  start.amplitude_dn = candidate.fit.amplitude_dn;
+  start.spread_px = std::sqrt(candidate.fit.sigma_u_px * candidate.fit.sigma_v_px);
+  SpotFit fit;
+  const auto neighbours = std::span(others).first(count);
+  const auto care = is_crowd ? SpotMeter::Care::kQuick : SpotMeter::Care::kFull;
+  if (meter.Measure(image, start, noise, neighbours, care, &fit) != SpotVerdict::kMeasured) {
+    return false;
+  }
+  const double moved_px = Length(fit.u_px - start.u_px, fit.v_px - start.v_px);
+  const double rate = std::clamp(moved_px / std::max(candidate.moved_px, 1e-9), 0.5, 0.95);
+  candidate.left_px = moved_px * rate / (1.0 - rate);
+  candidate.moved_px = moved_px;
+  candidate.overlap = Overlap(fit, neighbours);
+  candidate.fit = fit;
+  return true;
 }
 
 double CentreFinder::WorkSpace::MedianOfSorted() {
@@ -429,9 +557,9 @@ void CentreFinder::WorkSpace::Report(const FinderOptions& options) {
     }
     // Longer than round, and longer than the rest: two lamps in one, their distance unknown.
     const Stretch own = StretchOf(fit);
-    const double beyond_round = std::hypot(own.along_px2, own.across_px2);
+    const double beyond_round = Length(own.along_px2, own.across_px2);
     const double beyond_rest =
-        std::hypot(own.along_px2 - common.along_px2, own.across_px2 - common.across_px2);
+        Length(own.along_px2 - common.along_px2, own.across_px2 - common.across_px2);
     const double beyond = std::min(beyond_round, beyond_rest);
     const double double_variance = beyond > 0.3 * spread * spread ? beyond : 0.0;
     double noise_variance = 0.5 * (fit.by_dark_u_px2 + fit.by_dark_v_px2) +
@@ -439,7 +567,7 @@ void CentreFinder::WorkSpace::Report(const FinderOptions& options) {
     // A step of the background under the spot pulls the centre by about its height by the spot's,
     // in spreads, and the height is about twice the RMS; the same goes for light that has another
     // shape than the model.
-    const double share = std::hypot(misfit, 2.0 * fit.background_structure_dn / fit.amplitude_dn);
+    const double share = Length(misfit, 2.0 * fit.background_structure_dn / fit.amplitude_dn);
     const double structure_variance = share * share * spread * spread;
     Centre centre;
     centre.pixel_px = {fit.u_px, fit.v_px};

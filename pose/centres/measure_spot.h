@@ -59,11 +59,16 @@ class SpotMeter {
  public:
   explicit SpotMeter(double min_spread_px, double max_spread_px);
 
+  // Among a crowd a spot is measured kQuick: in a smaller window, and a
+  // step earlier at the end.
+  enum class Care { kFull, kQuick };
+
   // `others` are spots already measured whose light is taken away first.
   SpotVerdict Measure(const ImageView& image,
                       const SpotGuess& guess,
                       const SensorNoise& noise,
                       std::span<const SpotFit* const> others,
+                      Care care,
                       SpotFit* fit);
 
  private:
@@ -73,22 +78,33 @@ class SpotMeter {
                           const SpotGuess& guess,
                           const SensorNoise& noise,
                           std::span<const SpotFit* const> others,
+                          Care care,
                           SpotFit* fit);
   void FillTables(const SpotFit& fit);
-  Scores Score(const SpotFit& fit, double gain) const;
-  bool Improve(double gain, SpotFit* fit);
+  // Weights are one over the variance of the model at `fit`, kept for later, or those kept. Looks
+  // at every row or at every second.
+  enum class Weighing { kFresh, kFreshMasked, kKept };
+  template <Weighing kWeighing>
+  Scores Score(const SpotFit& fit, double gain, int every);
+  bool Improve(double gain, Care care, SpotFit* fit);
   void MaskNearClipping(const SpotFit& fit, double gain, double full_dn);
   bool MaskSingleBrightPixels(const SpotFit& fit, double gain);
   SpotVerdict Judge(const ImageView& image, const SpotGuess& guess, const SpotFit& fit) const;
-  void Conclude(double gain, SpotFit* fit) const;
+  void ConcludeVariance(SpotFit* fit) const;
+  // Shape and gain; returns whether a pixel far above the model was met.
+  bool ConcludeShape(SpotFit* fit) const;
 
   double min_spread_px_;
   double max_spread_px_;
   SpotPatch patch_;
-  // Per column and per row of the patch's inner window: Gaussian, distance [px], distance squared
-  // [sigma^2].
-  std::vector<float> gauss_u_, offset_u_, square_u_;
-  std::vector<float> gauss_v_, offset_v_, square_v_;
+  // Per column and per row of the patch's inner window, see FillGaussian.
+  std::vector<float> columns_;
+  std::vector<float> rows_;
+  // One over the variance of each pixel of the inner window; zero where a pixel is masked.
+  std::vector<float> weight_;
+  // Sums over the columns of each row of the window.
+  static constexpr std::size_t kRowSums = 6;
+  std::vector<float> row_sums_;
 };
 
 }  // namespace tbm

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "pose/centres/elementary.h"
+
 namespace tbm {
 namespace {
 
@@ -16,7 +18,7 @@ double ExpectedWeight(const SpotGuess& guess, double offset_dn, double ceiling_d
   const double a = std::max(guess.amplitude_dn, 1.001 * offset_dn);
   const double top = std::min(a, ceiling_dn);
   return kTwoPi * guess.spread_px * guess.spread_px *
-         (top * std::log(a / top) + top - offset_dn - offset_dn * std::log(a / offset_dn));
+         (top * LogOf(a / top) + top - offset_dn - offset_dn * LogOf(a / offset_dn));
 }
 
 // One round, Gaussian-like spot: nothing to take apart.
@@ -24,17 +26,37 @@ bool LooksLikeOneSpot(const RaisedBlob& raised,
                       const SpotGuess& guess,
                       const SplitOptions& options,
                       std::uint32_t max_value) {
-  if (guess.spread_px > options.max_spread_px || raised.blob.Elongation() > 1.15) return false;
+  if (guess.spread_px > options.max_spread_px || guess.elongation > 1.15) return false;
+  if (raised.blob.pixels > MostSpotPixels(options.max_spread_px)) return false;
   const double ceiling_dn = static_cast<double>(max_value) - raised.background_dn;
-  const double share = raised.blob.weight / ExpectedWeight(guess, raised.offset_dn, ceiling_dn);
+  const double share = guess.weight_dn / ExpectedWeight(guess, raised.offset_dn, ceiling_dn);
   return share > 0.75 && share < 1.33;
 }
 
 // The next higher cut, by one grey value at least; 0 when the top is reached. In steps fine enough
 // that one falls between a spot of half the brightness and the saddle to its neighbour 3.4 sigmas
-// away; two equal spots part at 0.87 of the peak when they are 2.4 sigmas apart.
-double NextOffset(const RaisedBlob& raised) {
+// away; two equal spots part at 0.87 of the peak when they are 2.4 sigmas apart. A streak that has
+// room for a few spots only is cut in large steps: what it is shows soon.
+// And so is what is too large for a spot: a lamp, in whose halo only bright spots can be told.
+double NextOffset(const RaisedBlob& raised, double elongation, int most_pixels) {
+  constexpr int kFewSpotsPixels = 300;
+  constexpr double kStreak = 4.0;
   const double amplitude_dn = raised.blob.peak_dn - raised.background_dn;
+  if (elongation > kStreak && raised.blob.pixels < kFewSpotsPixels) {
+    for (const double share : {0.35, 0.62, 0.87}) {
+      if (share * amplitude_dn > 1.05 * raised.offset_dn + 1.0) return share * amplitude_dn;
+    }
+    return 0.0;
+  }
+  if (raised.blob.pixels > most_pixels) {
+    if (1.8 * raised.offset_dn < 0.22 * amplitude_dn) {
+      return std::max(1.8 * raised.offset_dn, raised.offset_dn + 1.0);
+    }
+    for (const double share : {0.22, 0.35, 0.52, 0.74}) {
+      if (share * amplitude_dn > 1.05 * raised.offset_dn + 1.0) return share * amplitude_dn;
+    }
+    return 0.0;
+  }
   if (1.5 * raised.offset_dn < 0.22 * amplitude_dn) {
     return std::max(1.5 * raised.offset_dn, raised.offset_dn + 1.0);
   }
@@ -50,15 +72,18 @@ SpotGuess GuessSpot(const RaisedBlob& raised, std::uint32_t max_value) {
   const Blob& blob = raised.blob;
   const double ceiling_dn = static_cast<double>(max_value) - raised.background_dn;
   SpotGuess guess;
-  guess.u_px = blob.u_px();
-  guess.v_px = blob.v_px();
+  const BlobShape shape = ShapeOf(blob);
+  guess.u_px = shape.u_px;
+  guess.v_px = shape.v_px;
+  guess.weight_dn = shape.weight_dn;
+  guess.elongation = shape.elongation;
   guess.background_dn = raised.background_dn;
   guess.amplitude_dn = std::max(blob.peak_dn - raised.background_dn, 1.0);
-  const double log_height = std::max(std::log(guess.amplitude_dn / raised.offset_dn), 0.2);
+  const double log_height = std::max(LogOf(guess.amplitude_dn / raised.offset_dn), 0.2);
   guess.spread_px = std::sqrt(std::max(blob.pixels - blob.clipped, 1) / (kTwoPi * log_height));
   if (blob.clipped > 0) {
     const double area = kTwoPi * guess.spread_px * guess.spread_px;
-    guess.amplitude_dn = ceiling_dn * std::exp(std::min(blob.clipped / area, 4.0));
+    guess.amplitude_dn = ceiling_dn / DecayOf(std::min(blob.clipped / area, 4.0));
   }
   return guess;
 }
@@ -70,7 +95,10 @@ BlobSplitter::BlobSplitter(std::size_t max_runs) : labeller_(max_runs) {
 
 bool BlobSplitter::Split(const ImageView& image,
                          const RaisedBlob& raised,
+                         const SpotGuess& whole,
                          const SplitOptions& options) {
+  const int most_pixels = MostSpotPixels(options.max_spread_px);
+  if (LooksLikeOneSpot(raised, whole, options, image.max_value)) return Keep(whole);
   pieces_.clear();
   pieces_.push_back({raised, raised, false});
   while (!pieces_.empty()) {
@@ -82,13 +110,18 @@ bool BlobSplitter::Split(const ImageView& image,
         piece.widest = piece.raised;
         piece.has_widest = true;
       }
-      const double offset_dn = NextOffset(piece.raised);
+      const double offset_dn = NextOffset(piece.raised, guess.elongation, most_pixels);
       if (offset_dn > 0.0 && PushChildren(image, piece, offset_dn, options) > 0) continue;
       if (piece.has_widest) guess = GuessSpot(piece.widest, image.max_value);
     }
-    if (guesses_.size() == guesses_.capacity()) return false;
-    guesses_.push_back(guess);
+    if (!Keep(guess)) return false;
   }
+  return true;
+}
+
+bool BlobSplitter::Keep(const SpotGuess& guess) {
+  if (guesses_.size() == guesses_.capacity()) return false;
+  guesses_.push_back(guess);
   return true;
 }
 
@@ -99,24 +132,21 @@ std::size_t BlobSplitter::PushChildren(const ImageView& image,
   const Blob& box = parent.raised.blob;
   const double background_dn = parent.raised.background_dn;
   const int threshold_dn = static_cast<int>(background_dn + offset_dn);
-  const auto* first = static_cast<const std::byte*>(image.pixels);
   labeller_.Clear();
   for (int row = box.top; row <= box.bottom; ++row) {
-    const std::byte* row_start = first + row * image.stride_bytes;
     if (image.bytes_per_pixel == 1) {
-      labeller_.Scan<std::uint8_t>(
-          row_start, row, box.left, box.right + 1, threshold_dn, image.max_value);
+      labeller_.Scan<std::uint8_t>(image, row, box.left, box.right + 1, threshold_dn);
     } else {
-      labeller_.Scan<std::uint16_t>(
-          row_start, row, box.left, box.right + 1, threshold_dn, image.max_value);
+      labeller_.Scan<std::uint16_t>(image, row, box.left, box.right + 1, threshold_dn);
     }
   }
-  const double noise_dn = std::hypot(
-      options.noise_dn, std::sqrt(options.gain_dn_per_electron * std::max(offset_dn, 0.0)));
+  const double noise_dn = std::sqrt(options.noise_dn * options.noise_dn +
+                                    options.gain_dn_per_electron * std::max(offset_dn, 0.0));
   const std::size_t before = pieces_.size();
-  for (const Blob& blob : labeller_.Finish()) {
+  for (const Blob& blob : labeller_.Finish(image, MostSpotPixels(options.max_spread_px))) {
     const bool rises = blob.peak_dn - threshold_dn > 4.0 * noise_dn || blob.clipped > 2;
-    if (blob.pixels < 3 || !rises || pieces_.size() == pieces_.capacity()) continue;
+    if (blob.pixels < Blob::kFewestPixels || !rises || pieces_.size() == pieces_.capacity())
+      continue;
     const RaisedBlob raised{blob, background_dn, threshold_dn + 0.5 - background_dn};
     pieces_.push_back({raised, parent.widest, parent.has_widest});
   }

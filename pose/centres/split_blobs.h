@@ -14,6 +14,8 @@ struct SpotGuess {
   double spread_px = 0.0;
   double amplitude_dn = 0.0;  // above the background; beyond full scale where clipped
   double background_dn = 0.0;
+  double elongation = 1.0;  // of the blob
+  double weight_dn = 0.0;   // of the blob
 };
 
 // A blob, and how far above the background its pixels are.
@@ -26,6 +28,12 @@ struct RaisedBlob {
 // Spread and amplitude of the Gaussian whose cut at the blob's offset has the blob's area; where it
 // is clipped, the area of the clipped plateau gives the amplitude.
 SpotGuess GuessSpot(const RaisedBlob& raised, std::uint32_t max_value);
+
+// A blob of more pixels than this is no spot, however bright: its Gaussian's cut at 1/3000 of its
+// height would still be smaller.
+inline int MostSpotPixels(double max_spread_px) {
+  return static_cast<int>(50.0 * max_spread_px * max_spread_px);
+}
 
 struct SplitOptions {
   double max_spread_px = 8.0;
@@ -41,7 +49,10 @@ class BlobSplitter {
   explicit BlobSplitter(std::size_t max_runs);
 
   // Appends to guesses() up to its capacity; false when there was no room for one.
-  bool Split(const ImageView& image, const RaisedBlob& raised, const SplitOptions& options);
+  bool Split(const ImageView& image,
+             const RaisedBlob& raised,
+             const SpotGuess& guess,
+             const SplitOptions& options);
   std::vector<SpotGuess>& guesses() { return guesses_; }
 
  private:
@@ -51,6 +62,7 @@ class BlobSplitter {
     bool has_widest = false;
   };
 
+  bool Keep(const SpotGuess& guess);
   std::size_t PushChildren(const ImageView& image,
                            const Piece& parent,
                            double offset_dn,

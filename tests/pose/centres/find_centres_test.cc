@@ -9,7 +9,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pose/centres/any_above.h"
 #include "tests/support/no_alloc.h"
 #include "tests/support/render.h"
 
@@ -403,47 +402,6 @@ TEST(FindCentres, PureNoiseEndsAndFindsNothing) {
   const ImageView view{image.bytes.data(), 1280, 1024, 1280, 1, 255};
   const auto found = finder.Find(view);
   EXPECT_TRUE(!found || found.value()->centres.empty());
-}
-
-template <class Pixel>
-void CompareVectorWithPlain(Random& random) {
-  std::vector<std::byte> memory(9 * 64 * sizeof(Pixel) + 40);
-  for (int draw = 0; draw < 1000; ++draw) {
-    const int bits = random.Index(8 * int{sizeof(Pixel)}) + 1;
-    const auto mask = static_cast<std::uint64_t>((1 << bits) - 1);
-    for (std::size_t i = 0; i + sizeof(Pixel) <= memory.size(); i += sizeof(Pixel)) {
-      const auto pixel = static_cast<Pixel>(random.Bits() & mask);
-      std::memcpy(&memory[i], &pixel, sizeof pixel);
-    }
-    const std::byte* first = memory.data() + random.Index(16);
-    const std::ptrdiff_t stride = 64 * int{sizeof(Pixel)} + random.Index(3);
-    const int rows = random.Index(9);
-    // Close to the brightest pixel both answers occur.
-    int brightest = 0;
-    for (int row = 0; row < rows; ++row) {
-      for (int i = 0; i < kBlockWidth; ++i) {
-        brightest = std::max<int>(brightest,
-                                  LoadPixel<Pixel>(first + row * stride + i * int{sizeof(Pixel)}));
-      }
-    }
-    for (const int threshold : {-1, 0, brightest - 1, brightest, brightest + 1, 255, 65535}) {
-      EXPECT_EQ(AnyAbove<Pixel>(first, stride, rows, threshold),
-                AnyAbovePlain<Pixel>(first, stride, kBlockWidth, rows, threshold))
-          << "threshold " << threshold << " brightest " << brightest;
-      EXPECT_EQ((AnyAbove<Pixel, 16>(first, stride, rows, threshold)),
-                AnyAbovePlain<Pixel>(first, stride, 16, rows, threshold));
-    }
-  }
-}
-
-TEST(AnyAbove, VectorAndPlainAgreeForBytes) {
-  Random random("AnyAbove.Bytes");
-  CompareVectorWithPlain<std::uint8_t>(random);
-}
-
-TEST(AnyAbove, VectorAndPlainAgreeForWords) {
-  Random random("AnyAbove.Words");
-  CompareVectorWithPlain<std::uint16_t>(random);
 }
 
 }  // namespace
