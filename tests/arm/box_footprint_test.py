@@ -1,5 +1,5 @@
-"""What the camera box takes: its peak resident memory while it measures and records, and the time from the start of
-the process to the first pose at a reader on DDS. PC build, simulated machine on loopback."""
+"""What the camera box takes: its peak resident memory, and the time from the start of the process to the first pose at
+a reader on DDS. PC build, simulated machine on loopback."""
 import argparse
 import os
 import re
@@ -12,9 +12,11 @@ import time
 import package_world as world
 
 MEMORY_LIMIT_MB = 48.0
+# While the disk stalls, the recorder holds up to 8 images of 1280 x 1024 (Recorder::kBuffers).
+RECORDING_LIMIT_MB = MEMORY_LIMIT_MB + 8 * 1.31
 # A functional limit: camera opened, packet size found, inclinometers asked, readers discovered.
 FIRST_POSE_LIMIT_S = 5.0
-MEASURED_S = 8.0
+MEASURED_S = 6.0
 DOMAIN = "162"
 
 
@@ -35,12 +37,12 @@ class Reader(threading.Thread):
                 self.poses += 1
 
 
-def configuration(source, folder):
-    """The example, recording, in a domain of this test's own."""
+def configuration(source, folder, records):
+    """The example, in a domain of this test's own."""
     with open(f"{source}/pose/app/example/camera_box.yaml", encoding="utf-8") as file:
         text = file.read()
-    for old, new in (("domain: 25", f"domain: {DOMAIN}"), ("# folder: runs", "folder: runs"),
-                     ("limit_mb: 2000", "limit_mb: 100")):
+    for old, new in (("domain: 25", f"domain: {DOMAIN}"), ("limit_mb: 2000", "limit_mb: 100"),
+                     ("# folder: runs", "folder: runs" if records else "# folder: runs")):
         if old not in text:
             raise SystemExit(f"FAILED: the example configuration has no '{old}'")
         text = text.replace(old, new)
@@ -61,7 +63,7 @@ def memory_mb(process, name):
         return int(re.search(rf"{name}:\s*(\d+) kB", file.read()).group(1)) * 1024 / 1e6
 
 
-def measure(checks, arguments, folder, processes):
+def measure(checks, arguments, folder, processes, records):
     simulator = subprocess.Popen([arguments.tbm_sim, "--rig", "rig.yaml"], cwd=folder, stdout=subprocess.PIPE, text=True)
     processes.append(simulator)
     checks.that(any(line.startswith("ready") for line in simulator.stdout), "the simulated machine runs")
@@ -80,13 +82,14 @@ def measure(checks, arguments, folder, processes):
     first_pose_s = reader.first_pose_at - began
     time.sleep(MEASURED_S)
     peak_mb = memory_mb(box, "VmHWM")
-    print(f"figure: peak resident memory {peak_mb:.1f} MB (wanted {MEMORY_LIMIT_MB:.0f}), of it "
-          f"{memory_mb(box, 'RssFile'):.1f} MB files shared with others; first pose after {first_pose_s:.2f} s "
+    limit_mb = RECORDING_LIMIT_MB if records else MEMORY_LIMIT_MB
+    print(f"figure: {'recording' if records else 'measuring'}: peak resident memory {peak_mb:.1f} MB (wanted "
+          f"{limit_mb:.0f}), of it {memory_mb(box, 'RssFile'):.1f} MB of files; first pose after {first_pose_s:.2f} s "
           f"(wanted {FIRST_POSE_LIMIT_S:.0f})")
-    checks.that(peak_mb <= MEMORY_LIMIT_MB, f"at most {MEMORY_LIMIT_MB:.0f} MB resident")
+    checks.that(peak_mb <= limit_mb, f"at most {limit_mb:.0f} MB resident")
     checks.that(first_pose_s <= FIRST_POSE_LIMIT_S, f"first pose within {FIRST_POSE_LIMIT_S:.0f} s")
     checks.that(reader.poses > 2 * MEASURED_S, f"poses go on: {reader.poses}")
-    checks.that(os.listdir(f"{folder}/runs"), "it was recording")
+    checks.equal(os.path.isdir(f"{folder}/runs"), records, "recording is as configured")
 
 
 def main():
@@ -95,15 +98,16 @@ def main():
         parser.add_argument(name, required=True)
     arguments = parser.parse_args()
     checks = world.Checks()
-    processes = []
-    with tempfile.TemporaryDirectory() as folder:
-        configuration(arguments.source, folder)
-        try:
-            measure(checks, arguments, folder, processes)
-        finally:
-            for process in reversed(processes):
-                process.terminate()
-                process.wait()
+    for records in (False, True):
+        processes = []
+        with tempfile.TemporaryDirectory() as folder:
+            configuration(arguments.source, folder, records)
+            try:
+                measure(checks, arguments, folder, processes, records)
+            finally:
+                for process in reversed(processes):
+                    process.terminate()
+                    process.wait()
     checks.end()
 
 
