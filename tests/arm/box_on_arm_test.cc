@@ -128,7 +128,7 @@ class BoxOnArm : public ::testing::Test {
     return worst_m;
   }
 
-  const SystemClock clock_;
+  const SystemClock clock_{};
   test::TempFolder folder_;
   std::shared_ptr<const sim::World> world_;
   std::unique_ptr<GigeSimulator> gige_;

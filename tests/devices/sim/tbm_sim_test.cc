@@ -88,7 +88,7 @@ class TbmSim : public ::testing::TestWithParam<std::string> {
 
   TempFolder folder_;
   std::optional<Process> simulator_;
-  const SystemClock clock_;
+  const SystemClock clock_{};
 };
 
 TEST_P(TbmSim, CameraInclinometersAndTruthAreOfOneWorld) {
