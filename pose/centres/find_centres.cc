@@ -39,8 +39,10 @@ constexpr double kLargestWellElectrons = 100000.0;
 // Shape misfit, as a share of the spot's light, beyond which it is no spot.
 constexpr double kLargestMisfit = 0.3;
 // A guess of the spread is too large by some percent, never too small by as much.
-constexpr double kNarrowGuess = 1.0;
+constexpr double kNarrowGuess = 1.1;
 constexpr double kLongGuess = 1.3;
+// What rises so little above the threshold's offset says nothing of its width.
+constexpr double kFaintest = 1.25;
 
 struct Candidate {
   SpotGuess guess;
@@ -322,21 +324,32 @@ std::size_t CentreFinder::WorkSpace::CollectGuesses(const ImageView& image,
       options.gain_dn_per_electron.value_or(full_dn / kAssumedWellElectrons);
   std::size_t blobs = 0;
   splitter.guesses().clear();
-  for (const Blob& blob : labeller.Finish(image, MostSpotPixels(options.max_spread_px))) {
+  const double narrowest_px = kNarrowGuess * options.min_spread_px;
+  // Whatever the peak: the area of a narrow spot cut at 1/50 of its height.
+  const int few_pixels = static_cast<int>(25.0 * narrowest_px * narrowest_px);
+  for (Blob& blob : labeller.Finish()) {
     if (blob.pixels < Blob::kFewestPixels) {
       ++found.levels.rejected_spots;
       continue;
     }
     const float level = levels.At(0.5f * static_cast<float>(blob.left + blob.right),
                                   0.5f * static_cast<float>(blob.top + blob.bottom));
-    RaisedBlob raised{blob, static_cast<double>(level), offset_dn};
-    raised.offset_dn = std::floor(raised.background_dn + offset_dn) + 0.5 - raised.background_dn;
-    raised.offset_dn = std::max(raised.offset_dn, 0.5);
-    const SpotGuess guess = GuessSpot(raised, image.max_value);
-    if (guess.spread_px < kNarrowGuess * options.min_spread_px) {
-      ++found.levels.rejected_spots;
-      continue;
+    RaisedBlob raised;
+    raised.background_dn = static_cast<double>(level);
+    // Between the grey values on both sides of the threshold.
+    const auto threshold_dn = static_cast<int>(raised.background_dn + offset_dn);
+    raised.offset_dn = std::max(threshold_dn + 0.5 - raised.background_dn, 0.5);
+    raised.blob = blob;
+    if (blob.pixels <= few_pixels) {
+      labeller.FindPeak(image, raised.blob);
+      if (GuessSpread(raised) < narrowest_px) {
+        ++found.levels.rejected_spots;
+        continue;
+      }
     }
+    labeller.LookAt(image, MostSpotPixels(options.max_spread_px), blob);
+    raised.blob = blob;
+    const SpotGuess guess = GuessSpot(raised, image.max_value);
     ++blobs;
     if (!splitter.Split(image, raised, guess, split)) ++found.levels.dropped_spots;
   }
@@ -357,6 +370,7 @@ void CentreFinder::WorkSpace::ChooseCandidates(const ImageView& image,
       continue;
     }
     if (guess.spread_px > 1.5 * options.max_spread_px ||
+        guess.amplitude_dn < kFaintest * offset_dn ||
         guess.elongation > kLongGuess * options.max_elongation ||
         !StandsOut(image, guess, 0.7 * options.min_snr * found.levels.noise_dn)) {
       ++found.levels.rejected_spots;

@@ -78,14 +78,13 @@ BlobShape ShapeOf(const Blob& blob) {
 }
 
 RunLabeller::RunLabeller(std::size_t max_runs) {
-  runs_.reserve(max_runs);
-  blobs_.reserve(max_runs);
+  runs_.resize(max_runs);
+  blobs_.resize(max_runs);
   blob_of_run_.resize(max_runs);
 }
 
 void RunLabeller::Clear() {
-  runs_.clear();
-  blobs_.clear();
+  run_count_ = 0;
   above_begin_ = row_begin_ = 0;
   row_ = -2;
   overflowed_ = false;
@@ -118,98 +117,138 @@ void RunLabeller::Scan(const ImageView& image, int row, int first, int last, int
 template void RunLabeller::Scan<std::uint8_t>(const ImageView&, int, int, int, int);
 template void RunLabeller::Scan<std::uint16_t>(const ImageView&, int, int, int, int);
 
+inline void RunLabeller::Append(int begin, int end, int threshold_dn) {
+  if (run_count_ == runs_.size()) {
+    overflowed_ = true;
+    return;
+  }
+  runs_[run_count_] = {row_, begin, end, threshold_dn, static_cast<std::uint32_t>(run_count_)};
+  ++run_count_;
+}
+
 void RunLabeller::AddRuns(int row, int column, std::uint32_t bits, int threshold_dn) {
-  const bool goes_on = (bits & 1) != 0 && open_end_ == column && row == row_;
-  if (open_end_ >= 0 && !goes_on) CloseRun();
+  if (open_end_ >= 0) bits = GoOn(row, column, bits, threshold_dn);
   if (bits == 0) return;
   if (row != row_) StartRow(row);
-  while (bits != 0) {
+  do {
     const int begin = std::countr_zero(bits);
     const int end = begin + std::countr_one(bits >> begin);
-    if (open_end_ < 0) {
+    if (end == kBits) {
       open_begin_ = column + begin;
+      open_end_ = column + kBits;
       open_threshold_dn_ = threshold_dn;
-    } else {
-      open_threshold_dn_ = std::min(open_threshold_dn_, threshold_dn);
+      return;
     }
-    open_end_ = column + end;
-    if (end == kBits) return;
-    CloseRun();
+    Append(column + begin, column + end, threshold_dn);
     bits &= ~std::uint32_t{0} << end;
+  } while (bits != 0);
+}
+
+// Adds to the open run what belongs to it; returns what does not.
+std::uint32_t RunLabeller::GoOn(int row, int column, std::uint32_t bits, int threshold_dn) {
+  if ((bits & 1) == 0 || open_end_ != column || row != row_) {
+    CloseRun();
+    return bits;
   }
+  open_threshold_dn_ = std::min(open_threshold_dn_, threshold_dn);
+  const int end = std::countr_one(bits);
+  open_end_ = column + end;
+  if (end == kBits) return 0;
+  CloseRun();
+  return bits & ~std::uint32_t{0} << end;
 }
 
 void RunLabeller::CloseRun() {
-  const auto itself = static_cast<std::uint32_t>(runs_.size());
-  if (runs_.size() == runs_.capacity()) {
-    overflowed_ = true;
-  } else {
-    runs_.push_back({row_, open_begin_, open_end_, open_threshold_dn_, itself});
-  }
+  Append(open_begin_, open_end_, open_threshold_dn_);
   open_end_ = -1;
 }
 
 void RunLabeller::StartRow(int row) {
   if (open_end_ >= 0) CloseRun();
   JoinRows();
-  above_begin_ = row == row_ + 1 ? row_begin_ : runs_.size();
-  row_begin_ = runs_.size();
+  above_begin_ = row == row_ + 1 ? row_begin_ : run_count_;
+  row_begin_ = run_count_;
   row_ = row;
 }
 
-std::uint32_t RunLabeller::Root(std::uint32_t run) {
-  while (runs_[run].parent != run) run = runs_[run].parent = runs_[runs_[run].parent].parent;
-  return run;
-}
-
 void RunLabeller::JoinRows() {
+  Run* const runs = runs_.data();
+  const auto root_of = [runs](std::uint32_t run) {
+    while (runs[run].parent != run) run = runs[run].parent = runs[runs[run].parent].parent;
+    return run;
+  };
   std::size_t above = above_begin_;
-  for (std::size_t here = row_begin_; here < runs_.size(); ++here) {
-    while (above < row_begin_ && runs_[above].end < runs_[here].begin) ++above;
-    for (std::size_t i = above; i < row_begin_ && runs_[i].begin <= runs_[here].end; ++i) {
-      const std::uint32_t a = Root(static_cast<std::uint32_t>(i));
-      const std::uint32_t b = Root(static_cast<std::uint32_t>(here));
-      runs_[std::max(a, b)].parent = std::min(a, b);
+  for (std::size_t here = row_begin_; here < run_count_; ++here) {
+    const int begin = runs[here].begin;
+    const int end = runs[here].end;
+    while (above < row_begin_ && runs[above].end < begin) ++above;
+    auto root = static_cast<std::uint32_t>(here);
+    for (std::size_t i = above; i < row_begin_ && runs[i].begin <= end; ++i) {
+      const std::uint32_t other = root_of(static_cast<std::uint32_t>(i));
+      const std::uint32_t first = std::min(root, other);
+      runs[std::max(root, other)].parent = first;
+      root = first;
     }
   }
 }
 
-std::span<const Blob> RunLabeller::Finish(const ImageView& image, int most_pixels) {
+std::span<Blob> RunLabeller::Finish() {
   StartRow(row_ + 2);
-  for (std::uint32_t i = 0; i < runs_.size(); ++i) {
-    const Run& run = runs_[i];
+  Run* const runs = runs_.data();
+  std::uint32_t* const blob_of_run = blob_of_run_.data();
+  Blob* const blobs = blobs_.data();
+  std::uint32_t count = 0;
+  for (std::uint32_t i = 0; i < run_count_; ++i) {
+    Run& run = runs[i];
     if (run.parent == i) {
-      blob_of_run_[i] = static_cast<std::uint32_t>(blobs_.size());
-      blobs_.push_back({run.begin, run.end - 1, run.row, run.row});
-    } else {
-      blob_of_run_[i] = blob_of_run_[run.parent];  // parents come first
+      blobs[count] = {run.begin, run.end - 1, run.row, run.row, i, run.end - run.begin};
+      blob_of_run[i] = count++;
+      continue;
     }
-    Blob& blob = blobs_[blob_of_run_[i]];
+    const std::uint32_t index = blob_of_run[run.parent];  // parents come first
+    blob_of_run[i] = index;
+    Blob& blob = blobs[index];
+    run.parent = blob.last_run;
+    blob.last_run = i;
     blob.left = std::min(blob.left, run.begin);
     blob.right = std::max(blob.right, run.end - 1);
-    blob.bottom = std::max(blob.bottom, run.row);
+    blob.bottom = run.row;
     blob.pixels += run.end - run.begin;
   }
-  if (image.bytes_per_pixel == 1) {
-    LookAtPixels<std::uint8_t>(image, most_pixels);
-  } else {
-    LookAtPixels<std::uint16_t>(image, most_pixels);
+  return {blobs, count};
+}
+
+void RunLabeller::FindPeak(const ImageView& image, Blob& blob) const {
+  const auto* first = static_cast<const std::byte*>(image.pixels);
+  const bool is_byte = image.bytes_per_pixel == 1;
+  for (std::uint32_t i = blob.last_run;; i = runs_[i].parent) {
+    const Run& run = runs_[i];
+    const std::byte* row_start = first + run.row * image.stride_bytes;
+    for (int x = run.begin; x < run.end; ++x) {
+      const int value = is_byte ? LoadPixel<std::uint8_t>(row_start + x)
+                                : LoadPixel<std::uint16_t>(row_start + 2 * x);
+      blob.peak_dn = std::max(blob.peak_dn, value);
+    }
+    if (run.parent == i) return;
   }
-  return blobs_;
+}
+
+void RunLabeller::LookAt(const ImageView& image, int most_pixels, Blob& blob) const {
+  const bool is_byte = image.bytes_per_pixel == 1;
+  if (blob.pixels > most_pixels) {
+    is_byte ? GlanceAt<std::uint8_t>(image, blob) : GlanceAt<std::uint16_t>(image, blob);
+  } else {
+    is_byte ? SumRuns<std::uint8_t>(image, blob) : SumRuns<std::uint16_t>(image, blob);
+  }
 }
 
 template <class Pixel>
-void RunLabeller::LookAtPixels(const ImageView& image, int most_pixels) {
+void RunLabeller::SumRuns(const ImageView& image, Blob& blob) const {
   const auto* first = static_cast<const std::byte*>(image.pixels);
-  for (std::size_t i = 0; i < runs_.size(); ++i) {
+  std::uint64_t weight = 0, sum_u = 0, sum_v = 0, sum_uu = 0, sum_uv = 0, sum_vv = 0;
+  for (std::uint32_t i = blob.last_run;; i = runs_[i].parent) {
     const Run& run = runs_[i];
-    Blob& blob = blobs_[blob_of_run_[i]];
-    if (blob.pixels < Blob::kFewestPixels) continue;
     const std::byte* row_start = first + run.row * image.stride_bytes;
-    if (blob.pixels > most_pixels) {
-      GlanceAtRun<Pixel>(row_start, image, run, blob);
-      continue;
-    }
     for (int begin = run.begin; begin < run.end; begin += kBits) {
       const ChunkSums chunk = SumChunk<Pixel>(row_start + begin * int{sizeof(Pixel)},
                                               std::min(kBits, run.end - begin),
@@ -217,43 +256,51 @@ void RunLabeller::LookAtPixels(const ImageView& image, int most_pixels) {
                                               image.max_value);
       const auto x = static_cast<std::uint32_t>(begin - blob.left);
       const auto y = static_cast<std::uint32_t>(run.row - blob.top);
-      const std::uint64_t w = chunk.weight;
-      const std::uint64_t wx = chunk.weight_x + x * w;
-      const std::uint64_t wy = y * w;
-      blob.weight += w;
-      blob.sum_u += wx;
-      blob.sum_v += wy;
-      blob.sum_uu += chunk.weight_xx + x * (chunk.weight_x + wx);
-      blob.sum_uv += y * wx;
-      blob.sum_vv += y * wy;
+      const std::uint64_t wx = chunk.weight_x + std::uint64_t{x} * chunk.weight;
+      const std::uint64_t wy = std::uint64_t{y} * chunk.weight;
+      weight += chunk.weight;
+      sum_u += wx;
+      sum_v += wy;
+      sum_uu += chunk.weight_xx + x * (chunk.weight_x + wx);
+      sum_uv += y * wx;
+      sum_vv += y * wy;
       blob.peak_dn = std::max(blob.peak_dn, chunk.peak_dn);
       blob.clipped += chunk.clipped;
     }
+    if (run.parent == i) break;
   }
+  blob.weight = weight;
+  blob.sum_u = sum_u;
+  blob.sum_v = sum_v;
+  blob.sum_uu = sum_uu;
+  blob.sum_uv = sum_uv;
+  blob.sum_vv = sum_vv;
 }
 
-// Of a large blob: every eighth row tells peak and clipped pixels.
 template <class Pixel>
-void RunLabeller::GlanceAtRun(const std::byte* row_start,
-                              const ImageView& image,
-                              const Run& run,
-                              Blob& blob) {
+void RunLabeller::GlanceAt(const ImageView& image, Blob& blob) const {
   constexpr int kEvery = 8;
-  if ((run.row - blob.top) % kEvery != 0) return;
+  const auto* first = static_cast<const std::byte*>(image.pixels);
   const auto highest_dark = static_cast<Pixel>(
       std::min<std::uint32_t>(image.max_value - 1, std::numeric_limits<Pixel>::max()));
-  for (int begin = run.begin; begin < run.end; begin += kBits) {
-    const int columns = std::min(kBits, run.end - begin);
-    const std::byte* at = row_start + begin * int{sizeof(Pixel)};
-    if (columns == kBits) {
-      const int clipped = std::popcount(vectors::BitsAbove(at, highest_dark));
-      blob.clipped += kEvery * clipped;
-      if (clipped > 0) blob.peak_dn = static_cast<int>(image.max_value);
-      if (clipped > 0) continue;
+  for (std::uint32_t i = blob.last_run;; i = runs_[i].parent) {
+    const Run& run = runs_[i];
+    const bool is_looked_at = (run.row - blob.top) % kEvery == 0;
+    const std::byte* row_start = first + run.row * image.stride_bytes;
+    for (int begin = run.begin; is_looked_at && begin < run.end; begin += kBits) {
+      const int columns = std::min(kBits, run.end - begin);
+      const std::byte* at = row_start + begin * int{sizeof(Pixel)};
+      if (columns == kBits) {
+        const int clipped = std::popcount(vectors::BitsAbove(at, highest_dark));
+        blob.clipped += kEvery * clipped;
+        if (clipped > 0) blob.peak_dn = static_cast<int>(image.max_value);
+        if (clipped > 0) continue;
+      }
+      const ChunkSums chunk = SumChunk<Pixel>(at, columns, run.threshold_dn, image.max_value);
+      blob.peak_dn = std::max(blob.peak_dn, chunk.peak_dn);
+      blob.clipped += kEvery * chunk.clipped;
     }
-    const ChunkSums chunk = SumChunk<Pixel>(at, columns, run.threshold_dn, image.max_value);
-    blob.peak_dn = std::max(blob.peak_dn, chunk.peak_dn);
-    blob.clipped += kEvery * chunk.clipped;
+    if (run.parent == i) return;
   }
 }
 

@@ -11,15 +11,15 @@ namespace tbm {
 
 // Pixels of one piece above a threshold that touch one another, corners included. The weight of a
 // pixel is its value above the threshold [DN]; moments are sums over pixels, counted from the left
-// upper corner of the box. Of blobs with fewer than kFewestPixels only box and number of pixels are
-// known.
+// upper corner of the box. What lies below `pixels` is known once it was asked for.
 struct Blob {
-  static constexpr int kFewestPixels = 3;
+  static constexpr int kFewestPixels = 3;  // fewer are a hot pixel
 
   int left = 0;  // box, ends included
   int right = 0;
   int top = 0;
   int bottom = 0;
+  std::uint32_t last_run = 0;  // of the labeller
   int pixels = 0;
   int clipped = 0;
   int peak_dn = 0;  // of the image, not above the threshold
@@ -56,11 +56,20 @@ class RunLabeller {
   void Scan(const ImageView& image, int row, int first, int last, int threshold_dn);
   // Bit i: pixel column + i of the row is bright.
   void AddBits(int row, int column, std::uint32_t bits, int threshold_dn) {
-    if (bits != 0 || open_end_ >= 0) AddRuns(row, column, bits, threshold_dn);
+    if (bits == ~std::uint32_t{0} && open_end_ == column && row == row_) {
+      open_end_ += 32;
+      if (threshold_dn < open_threshold_dn_) open_threshold_dn_ = threshold_dn;
+    } else if (bits != 0 || open_end_ >= 0) {
+      AddRuns(row, column, bits, threshold_dn);
+    }
   }
-  // Valid until the next Clear. A blob of more than `most_pixels` is no spot: it has no moments,
-  // and peak and clipped pixels are those of every eighth row.
-  std::span<const Blob> Finish(const ImageView& image, int most_pixels);
+  // Valid until the next Clear.
+  std::span<Blob> Finish();
+  // The brightest pixel alone.
+  void FindPeak(const ImageView& image, Blob& blob) const;
+  // Everything. A blob of more than `most_pixels` is no spot: it has no moments, and peak and
+  // clipped pixels are those of every eighth row.
+  void LookAt(const ImageView& image, int most_pixels, Blob& blob) const;
   bool overflowed() const { return overflowed_; }
 
  private:
@@ -69,20 +78,24 @@ class RunLabeller {
     int begin;
     int end;
     int threshold_dn;
+    // Of the tree of joined runs, whose root is its own parent; after Finish the run before it in
+    // its blob, or itself.
     std::uint32_t parent;
   };
 
   void AddRuns(int row, int column, std::uint32_t bits, int threshold_dn);
   void StartRow(int row);
+  std::uint32_t GoOn(int row, int column, std::uint32_t bits, int threshold_dn);
+  void Append(int begin, int end, int threshold_dn);
   void CloseRun();
   void JoinRows();
-  std::uint32_t Root(std::uint32_t run);
   template <class Pixel>
-  void LookAtPixels(const ImageView& image, int most_pixels);
+  void SumRuns(const ImageView& image, Blob& blob) const;
   template <class Pixel>
-  void GlanceAtRun(const std::byte* row_start, const ImageView& image, const Run& run, Blob& blob);
+  void GlanceAt(const ImageView& image, Blob& blob) const;
 
-  std::vector<Run> runs_;  // reserved once
+  std::vector<Run> runs_;  // the first run_count_ of them
+  std::size_t run_count_ = 0;
   std::vector<Blob> blobs_;
   std::vector<std::uint32_t> blob_of_run_;
   std::size_t above_begin_ = 0;  // runs of the row above, and of this row

@@ -17,15 +17,17 @@ constexpr int kLanes = SpotPatch::kLanes;
 
 constexpr double kWindowSigmas = 4.0;  // half width of what is fitted
 constexpr double kFrameSigmas = 5.5;   // half width of what the background is taken from
-constexpr double kQuickWindowSigmas = 3.3;
-constexpr double kQuickFrameSigmas = 4.7;
+constexpr double kQuickWindowSigmas = 3.0;
+constexpr int kQuickFramePx = 3;       // around the window
 constexpr double kBorderSigmas = 2.0;  // a centre closer to the image's border is not measured
 // From a fair guess three are enough: the error shrinks tenfold in each. Clipping and poor guesses
 // need more.
 constexpr int kMaxIterations = 15;
+constexpr int kQuickIterations = 8;
+constexpr double kNarrowest = 0.75;  // of the least spread: narrower along one axis is no spot
 // A window of at least so many rows is wide enough that every second row tells a smooth sum.
 constexpr int kFewRows = 15;
-// The frame around a window of at least so many rows has pixels to spare.
+// Around a window of at least so many rows every second row has pixels enough for the background.
 constexpr int kManyRows = 21;
 
 // A single pixel this many sigmas above the model is a hot one, if its neighbours do not share it.
@@ -109,12 +111,14 @@ SpotVerdict SpotMeter::MeasureOnce(const ImageView& image,
                                    SpotFit* fit) {
   const bool is_quick = care == Care::kQuick;
   const int half = HalfWidth(is_quick ? kQuickWindowSigmas : kWindowSigmas, guess.spread_px);
-  const int frame_half = HalfWidth(is_quick ? kQuickFrameSigmas : kFrameSigmas, guess.spread_px);
-  fit->clipped_pixels = patch_.Copy(
-      image, Rounded(guess.u_px), Rounded(guess.v_px), half, std::max(frame_half, half + 3));
+  const int frame_half =
+      is_quick ? half + kQuickFramePx
+               : std::max(HalfWidth(kFrameSigmas, guess.spread_px), half + kQuickFramePx);
+  fit->clipped_pixels =
+      patch_.Copy(image, Rounded(guess.u_px), Rounded(guess.v_px), half, frame_half);
   for (const SpotFit* other : others) patch_.RemoveLight(*other);
   const double noise_dn = std::sqrt(noise.dark_variance_dn2);
-  const int every = is_quick || patch_.inner().height() >= kManyRows ? 2 : 1;
+  const int every = patch_.inner().height() >= (is_quick ? kFewRows : kManyRows) ? 2 : 1;
   if (!patch_.FitBackground(noise_dn, guess.u_px, guess.v_px, every)) {
     return SpotVerdict::kNotASpot;
   }
@@ -156,7 +160,7 @@ SpotVerdict SpotMeter::Judge(const ImageView& image,
   if (Distance(fit.u_px - guess.u_px, fit.v_px - guess.v_px) > 2.0 * guess.spread_px + 1.0) {
     return SpotVerdict::kNotASpot;
   }
-  if (narrowest < 0.5 * min_spread_px_) return SpotVerdict::kNarrow;
+  if (narrowest < kNarrowest * min_spread_px_) return SpotVerdict::kNarrow;
   if (widest > 2.0 * max_spread_px_) return SpotVerdict::kWide;
   const double border = std::min({fit.u_px + 0.5,
                                   fit.v_px + 0.5,
@@ -287,7 +291,8 @@ bool SpotMeter::Improve(double gain, Care care, SpotFit* fit) {
   const double small_shape = care == Care::kQuick ? 0.03 : 0.01;
   const bool coarse_start = patch_.inner().height() >= kFewRows;
   double longest = std::numeric_limits<double>::infinity();  // last step, relative
-  for (int i = 0; i < kMaxIterations; ++i) {
+  const int most = care == Care::kQuick ? kQuickIterations : kMaxIterations;
+  for (int i = 0; i < most; ++i) {
     FillTables(*fit);
     const bool coarse = i == 0 && coarse_start;
     const int every = coarse ? 2 : 1;
@@ -316,7 +321,9 @@ bool SpotMeter::Improve(double gain, Care care, SpotFit* fit) {
     fit->sigma_v_px *= Growth(std::clamp(shape[2], -0.4, 0.4));
     const double narrowest = std::min(fit->sigma_u_px, fit->sigma_v_px);
     const double widest = std::max(fit->sigma_u_px, fit->sigma_v_px);
-    if (narrowest < 0.2 || widest > 4.0 * max_spread_px_) break;  // the caller sees why
+    // The caller sees why.
+    if (narrowest < 0.2 || widest > 4.0 * max_spread_px_) break;
+    if (i >= 2 && narrowest < kNarrowest * min_spread_px_) break;
     const double shift_step = (std::abs(du) + std::abs(dv)) / narrowest;
     if (!coarse && shift_step < small_shift && shape_step < small_shape) break;
     longest = std::max(shift_step, shape_step);

@@ -49,10 +49,7 @@ double NextOffset(const RaisedBlob& raised, double elongation, int most_pixels) 
     return 0.0;
   }
   if (raised.blob.pixels > most_pixels) {
-    if (1.8 * raised.offset_dn < 0.22 * amplitude_dn) {
-      return std::max(1.8 * raised.offset_dn, raised.offset_dn + 1.0);
-    }
-    for (const double share : {0.22, 0.35, 0.52, 0.74}) {
+    for (const double share : {0.11, 0.3, 0.6}) {
       if (share * amplitude_dn > 1.05 * raised.offset_dn + 1.0) return share * amplitude_dn;
     }
     return 0.0;
@@ -68,6 +65,13 @@ double NextOffset(const RaisedBlob& raised, double elongation, int most_pixels) 
 
 }  // namespace
 
+double GuessSpread(const RaisedBlob& raised) {
+  const Blob& blob = raised.blob;
+  const double amplitude_dn = std::max(blob.peak_dn - raised.background_dn, 1.0);
+  const double log_height = std::max(LogOf(amplitude_dn / raised.offset_dn), 0.2);
+  return std::sqrt(std::max(blob.pixels - blob.clipped, 1) / (kTwoPi * log_height));
+}
+
 SpotGuess GuessSpot(const RaisedBlob& raised, std::uint32_t max_value) {
   const Blob& blob = raised.blob;
   const double ceiling_dn = static_cast<double>(max_value) - raised.background_dn;
@@ -79,8 +83,7 @@ SpotGuess GuessSpot(const RaisedBlob& raised, std::uint32_t max_value) {
   guess.elongation = shape.elongation;
   guess.background_dn = raised.background_dn;
   guess.amplitude_dn = std::max(blob.peak_dn - raised.background_dn, 1.0);
-  const double log_height = std::max(LogOf(guess.amplitude_dn / raised.offset_dn), 0.2);
-  guess.spread_px = std::sqrt(std::max(blob.pixels - blob.clipped, 1) / (kTwoPi * log_height));
+  guess.spread_px = GuessSpread(raised);
   if (blob.clipped > 0) {
     const double area = kTwoPi * guess.spread_px * guess.spread_px;
     guess.amplitude_dn = ceiling_dn / DecayOf(std::min(blob.clipped / area, 4.0));
@@ -143,10 +146,11 @@ std::size_t BlobSplitter::PushChildren(const ImageView& image,
   const double noise_dn = std::sqrt(options.noise_dn * options.noise_dn +
                                     options.gain_dn_per_electron * std::max(offset_dn, 0.0));
   const std::size_t before = pieces_.size();
-  for (const Blob& blob : labeller_.Finish(image, MostSpotPixels(options.max_spread_px))) {
+  for (Blob& blob : labeller_.Finish()) {
+    if (blob.pixels < Blob::kFewestPixels) continue;
+    labeller_.LookAt(image, MostSpotPixels(options.max_spread_px), blob);
     const bool rises = blob.peak_dn - threshold_dn > 4.0 * noise_dn || blob.clipped > 2;
-    if (blob.pixels < Blob::kFewestPixels || !rises || pieces_.size() == pieces_.capacity())
-      continue;
+    if (!rises || pieces_.size() == pieces_.capacity()) continue;
     const RaisedBlob raised{blob, background_dn, threshold_dn + 0.5 - background_dn};
     pieces_.push_back({raised, parent.widest, parent.has_widest});
   }

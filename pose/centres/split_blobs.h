@@ -28,6 +28,8 @@ struct RaisedBlob {
 // Spread and amplitude of the Gaussian whose cut at the blob's offset has the blob's area; where it
 // is clipped, the area of the clipped plateau gives the amplitude.
 SpotGuess GuessSpot(const RaisedBlob& raised, std::uint32_t max_value);
+// The spread alone, from area and peak.
+double GuessSpread(const RaisedBlob& raised);
 
 // A blob of more pixels than this is no spot, however bright: its Gaussian's cut at 1/3000 of its
 // height would still be smaller.

@@ -22,11 +22,6 @@ Floats Median3(const Floats& a, const Floats& b, const Floats& c) {
   return Larger(Smaller(a, b), Smaller(Larger(a, b), c));
 }
 
-Floats Median5(
-    const Floats& a, const Floats& b, const Floats& c, const Floats& d, const Floats& e) {
-  return Median3(Larger(Smaller(a, b), Smaller(c, d)), Smaller(Larger(a, b), Larger(c, d)), e);
-}
-
 }  // namespace
 
 SpotPatch::SpotPatch(int max_width) {
@@ -143,7 +138,7 @@ bool SpotPatch::IsSettled() const {
 }
 
 // The window has eight neighbours: sides and corners. Each gives the median of the medians of three
-// rows of five of its pixels; the plane goes through these, without up to three that are off:
+// rows of three of its pixels; the plane goes through these, without up to three that are off:
 // lamps, pipes.
 bool SpotPatch::PlaneThroughMedians(double noise_dn) {
   constexpr std::size_t kAreas = 8;
@@ -155,7 +150,7 @@ bool SpotPatch::PlaneThroughMedians(double noise_dn) {
                                                    {inner_.bottom + 1, outer_.bottom}}};
   std::array<double, kAreas> place_u{};
   std::array<double, kAreas> place_v{};
-  std::array<std::array<float, kAreas>, 15> sample{};
+  std::array<std::array<float, kAreas>, 9> sample{};
   std::size_t count = 0;
   for (std::size_t j = 0; j < 3; ++j) {
     for (std::size_t i = 0; i < 3; ++i) {
@@ -164,9 +159,9 @@ bool SpotPatch::PlaneThroughMedians(double noise_dn) {
       if ((i == 1 && j == 1) || width < 1 || height < 1) continue;
       for (int y = 0; y < 3; ++y) {
         const float* value = &values_[OuterIndex(rows[j][0] + (2 * y + 1) * height / 6)];
-        for (int x = 0; x < 5; ++x) {
-          const int column = columns[i][0] - outer_.left + (2 * x + 1) * width / 10;
-          sample[static_cast<std::size_t>(5 * y + x)][count] = value[column];
+        for (int x = 0; x < 3; ++x) {
+          const int column = columns[i][0] - outer_.left + (2 * x + 1) * width / 6;
+          sample[static_cast<std::size_t>(3 * y + x)][count] = value[column];
         }
       }
       place_u[count] = 0.5 * (columns[i][0] + columns[i][1]) - u_;
@@ -179,8 +174,8 @@ bool SpotPatch::PlaneThroughMedians(double noise_dn) {
   for (std::size_t i = 0; i < kAreas; i += kLanes) {
     std::array<Floats, 3> of_row;
     for (std::size_t y = 0; y < 3; ++y) {
-      const auto at = [&](std::size_t x) { return Load(&sample[5 * y + x][i]); };
-      of_row[y] = Median5(at(0), at(1), at(2), at(3), at(4));
+      const auto at = [&](std::size_t x) { return Load(&sample[3 * y + x][i]); };
+      of_row[y] = Median3(at(0), at(1), at(2));
     }
     Store(&medians[i], Median3(of_row[0], of_row[1], of_row[2]));
   }
@@ -236,19 +231,24 @@ struct SpotPatch::FrameSums {
 };
 
 void SpotPatch::FillColumnTables(float limit) {
+  const auto at = [](std::vector<float>& table, int column) { return table.begin() + column; };
   const int window_begin = inner_.left - outer_.left;
-  const int window_end = inner_.right - outer_.left;
+  const int window_end = inner_.right - outer_.left + 1;
   const int width = outer_.width();
-  const auto first_x = static_cast<float>(outer_.left - u_);
-  for (int i = 0; i < static_cast<int>(stride_); ++i) {
-    const auto column = static_cast<std::size_t>(i);
-    const bool inside = i < width;
-    const bool beside = inside && (i < window_begin || i > window_end);
-    column_x_[column] = first_x + static_cast<float>(i);
-    full_limit_[column] = inside ? limit : 0.0f;
-    full_cap_[column] = inside ? 6.0f * limit : 0.0f;
-    side_limit_[column] = beside ? limit : 0.0f;
-    side_cap_[column] = beside ? 6.0f * limit : 0.0f;
+  const int room = static_cast<int>(stride_);
+  const auto fill = [&](std::vector<float>& full, std::vector<float>& side, float value) {
+    std::fill(at(full, 0), at(full, width), value);
+    std::fill(at(full, width), at(full, room), 0.0f);
+    std::copy(at(full, 0), at(full, room), at(side, 0));
+    std::fill(at(side, window_begin), at(side, window_end), 0.0f);
+  };
+  fill(full_limit_, side_limit_, limit);
+  fill(full_cap_, side_cap_, 6.0f * limit);
+  const float ramp[4] = {0.0f, 1.0f, 2.0f, 3.0f};
+  Floats x = Spread(static_cast<float>(outer_.left - u_)) + Load(ramp);
+  for (std::size_t column = 0; column < stride_; column += kLanes) {
+    Store(&column_x_[column], x);
+    x = x + Spread(4.0f);
   }
 }
 
@@ -333,12 +333,11 @@ bool SpotPatch::RefinePlane(double limit_dn, int every) {
   FillColumnTables(static_cast<float>(limit_dn));
   summed_rows_.clear();
   double pixels = 0.0;
-  for (int row = outer_.top; row <= outer_.bottom;) {
+  for (int row = outer_.top; row <= outer_.bottom; row += every) {
     const bool beside = row >= inner_.top && row <= inner_.bottom;
     SumRow(row, &row_sums_[summed_rows_.size() * kRowSums * kLanes]);
     summed_rows_.push_back(row);
     pixels += outer_.width() - (beside ? inner_.width() : 0);
-    row += beside && row + every <= inner_.bottom + 1 ? every : 1;
   }
   const FrameSums sums = AddRows();
   const auto total = [](const Floats& of) { return static_cast<double>(Sum(of)); };

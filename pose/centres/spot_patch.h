@@ -51,7 +51,7 @@ class SpotPatch {
   void RemoveLight(const SpotFit& other);
   // A plane through the frame: medians of its sides and corners first, then least squares without
   // what is off by three sigma. False when too little of the frame is in the image or unclipped.
-  // Looks at every `every`-th row beside the window.
+  // Looks at every `every`-th row.
   bool FitBackground(double noise_dn, double u, double v, int every);
   // From the inner window.
   void SubtractBackground();

@@ -63,7 +63,7 @@ void AddFalseSpots(Random& random, RenderScene& scene) {
       spot.smear_px =
           random.Uniform(12.0, 30.0) * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     } else {
-      spot.sigma_px = random.Uniform(1.0, 4.0);
+      spot.sigma_px = random.Uniform(1.0, 3.0);
     }
     scene.spots.push_back(spot);
   }

@@ -27,7 +27,7 @@ std::vector<CostFrame> DarkFrames(const Rig& rig, int count);
 
 // The same in front of a work lamp (a disc of full scale 120 px across, its light falling off over
 // some tens of pixels) and among 300 false spots of 25..200 DN anywhere in the image: 240 glints of
-// wet steel (0.3..0.6 px), 40 streaks, 20 round ones like LEDs (1..4 px).
+// wet steel (0.3..0.6 px), 40 streaks, 20 round ones like LEDs (1..3 px).
 std::vector<CostFrame> GlareFrames(const Rig& rig, int count);
 
 }  // namespace tbm::test
