@@ -219,6 +219,8 @@ def check_package(checks, box, machine, root, package):
     output = machine.run("dpkg", "-P", UNIT)
     checks.equal(machine.run("systemctl", "is-active", UNIT).strip(), "inactive", "purging stops the service")
     checks.that("warning" not in output.lower(), "purging says nothing odd", output)
+    left = [path for path in ("/var/lib/tbm", "/etc/tbm", "/usr/bin/camera_box") if os.path.exists(root + path)]
+    checks.equal(left, [], "purging takes the recordings along")
 
 
 def main():

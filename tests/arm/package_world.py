@@ -155,7 +155,9 @@ class World:
         if done.returncode != 0:
             print(update.stdout[-2000:], done.stdout[-2000:])
             skip("the packages that it depends on cannot be downloaded")
-        os.makedirs(f"{folder}.new", exist_ok=True)
+        for old in glob.glob(f"{self.cache}/debs_{self.architecture}_*"):
+            shutil.rmtree(old)
+        os.makedirs(f"{folder}.new")
         for deb in glob.glob(f"{apt}/archives/*.deb"):
             shutil.move(deb, f"{folder}.new/")
         os.rename(f"{folder}.new", folder)
@@ -224,7 +226,8 @@ def shlibdeps(root, program, architecture, own_world):
         script = (f"mount -t tmpfs tmpfs {work}/upper && mkdir {work}/upper/u {work}/upper/w && "
                   f"mount -t overlay overlay -o lowerdir=/usr/lib,upperdir={work}/upper/u,workdir={work}/upper/w /usr/lib"
                   f" && mkdir -p /usr/lib/{triplet} && mount --bind {root}/usr/lib/{triplet} /usr/lib/{triplet} && "
-                  f"cd {work} && dpkg-shlibdeps --admindir={root}/var/lib/dpkg -O -e{program} 2>/dev/null")
+                  f"cd {work} && dpkg-shlibdeps --admindir={root}/var/lib/dpkg -O -e{program} 2>{work}/said || "
+                  f"{{ cat {work}/said; exit 1; }}")
         line = run([own_world, "sh", "-c", script],
                    env={**os.environ, "DEB_HOST_ARCH": architecture, "LC_ALL": "C"})
     return parse_depends(line.strip().removeprefix("shlibs:Depends="))

@@ -88,6 +88,7 @@ set(camera_box_libraries
 set(camera_box_depends ${camera_box_libraries} "init-system-helpers (>= 1.60)" "passwd" "systemd (>= 252)")
 set(tools_depends
   "libaravis-0.8-0 (>= 0.8.26)"
+  "libatlas3-base"
   "libc6 (>= 2.36)"
   "libcholmod3 (>= 1:5.12)"
   "libcxsparse3 (>= 1:5.12)"
