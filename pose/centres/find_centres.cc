@@ -44,6 +44,19 @@ constexpr double kLongGuess = 1.3;
 // What rises so little above the threshold's offset says nothing of its width.
 constexpr double kFaintest = 1.25;
 
+// A block of the strip that is being searched.
+struct BrightBlock {
+  int column;
+  int offset_bytes;  // from the row's first pixel
+  int threshold_dn;
+};
+
+template <class Pixel>
+BrightBlock BlockAt(std::size_t index, int threshold_dn) {
+  const int column = static_cast<int>(index) * kBlockWidth;
+  return {column, column * int{sizeof(Pixel)}, threshold_dn};
+}
+
 struct Candidate {
   SpotGuess guess;
   SpotFit fit;  // of the guess, until measured
@@ -168,7 +181,7 @@ struct CentreFinder::WorkSpace {
   std::vector<Candidate> candidates;
   std::vector<std::size_t> order;
   std::vector<double> sorted;
-  std::vector<std::size_t> bright_blocks;
+  std::vector<BrightBlock> bright_blocks;
   FoundCentres found;
   double offset_dn = 0.0;  // of the threshold above the level
   double gain = 0.0;
@@ -179,8 +192,9 @@ struct CentreFinder::WorkSpace {
   template <class Pixel>
   void FindBrightBlocks(const std::byte* first,
                         const ImageView& image,
-                        int rows,
                         std::span<const int> thresholds);
+  template <class Pixel>
+  void TakeAllBlocks(const ImageView& image, std::span<const int> thresholds);
   std::size_t CollectGuesses(const ImageView& image, const FinderOptions& options);
   void ChooseCandidates(const ImageView& image, const FinderOptions& options);
   void MeasureAll(const ImageView& image, const FinderOptions& options);
@@ -250,17 +264,19 @@ void CentreFinder::WorkSpace::ScanImage(const ImageView& image) {
   for (int row = 0; row < image.height_px; row += kBlockHeight) {
     const int rows = std::min(kBlockHeight, image.height_px - row);
     if (row % (2 * kBlockHeight) == 0) thresholds = levels.Thresholds(row, offset_dn, highest);
-    FindBrightBlocks<Pixel>(first + row * image.stride_bytes, image, rows, thresholds);
+    if (rows == kBlockHeight) {
+      FindBrightBlocks<Pixel>(first + row * image.stride_bytes, image, thresholds);
+    } else {
+      TakeAllBlocks<Pixel>(image, thresholds);
+    }
     const bool has_rest = columns < image.width_px;
     if (bright_blocks.empty() && !has_rest) continue;
     for (int y = row; y < row + rows; ++y) {
       const std::byte* row_start = first + y * image.stride_bytes;
-      for (const std::size_t block : bright_blocks) {
-        const int column = static_cast<int>(block) * kBlockWidth;
-        const int threshold = thresholds[block];
-        const std::uint32_t bits = vectors::BitsAbove(row_start + column * int{sizeof(Pixel)},
-                                                      static_cast<Pixel>(threshold));
-        labeller.AddBits(y, column, bits, threshold);
+      for (const BrightBlock& block : bright_blocks) {
+        const std::uint32_t bits = vectors::BitsAbove(row_start + block.offset_bytes,
+                                                      static_cast<Pixel>(block.threshold_dn));
+        labeller.AddBits(y, block.column, bits, block.threshold_dn);
       }
       if (!has_rest) continue;
       labeller.Scan<Pixel>(image, y, columns, image.width_px, thresholds[columns / kBlockWidth]);
@@ -273,7 +289,6 @@ void CentreFinder::WorkSpace::ScanImage(const ImageView& image) {
 template <class Pixel>
 void CentreFinder::WorkSpace::FindBrightBlocks(const std::byte* first,
                                                const ImageView& image,
-                                               int rows,
                                                std::span<const int> thresholds) {
   using namespace vectors;
   constexpr std::size_t kGroup = 8;
@@ -293,23 +308,35 @@ void CentreFinder::WorkSpace::FindBrightBlocks(const std::byte* first,
       flag += kRegister;
       any = Brighter(any, above);
     };
-    std::size_t pair = group;
-    for (; pair + 1 < end; pair += 2) {
-      const auto best = BrightestOfBlocks<Pixel>(first, stride_bytes, rows);
-      compare(best.left, pair);
-      compare(best.right, pair + 1);
+    std::size_t block = group;
+    for (; block + 2 <= end; block += 2) {
+      const auto best = BrightestOfBlocks<Pixel>(first, stride_bytes);
+      compare(best.left, block);
+      compare(best.right, block + 1);
       first += 2 * kBlockBytes;
     }
-    if (pair < end) {
-      compare(BrightestOfBlock<Pixel>(first, stride_bytes, rows), pair);
+    if (block < end) {
+      compare(BrightestOfBlock<Pixel>(first, stride_bytes), block);
       first += kBlockBytes;
     }
     if (!AnyLane(any)) continue;
-    for (std::size_t block = group; block < end; ++block) {
+    for (block = group; block < end; ++block) {
       std::array<std::uint32_t, 4> words;
       std::memcpy(words.data(), &flags[(block - group) * kRegister], sizeof words);
-      if ((words[0] | words[1] | words[2] | words[3]) != 0) bright_blocks.push_back(block);
+      if ((words[0] | words[1] | words[2] | words[3]) == 0) continue;
+      bright_blocks.push_back(BlockAt<Pixel>(block, thresholds[block]));
     }
+  }
+}
+
+// Of a strip of fewer rows, at the lower end of an image.
+template <class Pixel>
+void CentreFinder::WorkSpace::TakeAllBlocks(const ImageView& image,
+                                            std::span<const int> thresholds) {
+  const auto blocks = static_cast<std::size_t>(image.width_px / kBlockWidth);
+  bright_blocks.clear();
+  for (std::size_t block = 0; block < blocks; ++block) {
+    bright_blocks.push_back(BlockAt<Pixel>(block, thresholds[block]));
   }
 }
 
@@ -334,21 +361,19 @@ std::size_t CentreFinder::WorkSpace::CollectGuesses(const ImageView& image,
     }
     const float level = levels.At(0.5f * static_cast<float>(blob.left + blob.right),
                                   0.5f * static_cast<float>(blob.top + blob.bottom));
-    RaisedBlob raised;
-    raised.background_dn = static_cast<double>(level);
+    const auto background_dn = static_cast<double>(level);
     // Between the grey values on both sides of the threshold.
-    const auto threshold_dn = static_cast<int>(raised.background_dn + offset_dn);
-    raised.offset_dn = std::max(threshold_dn + 0.5 - raised.background_dn, 0.5);
-    raised.blob = blob;
+    const auto threshold_dn = static_cast<int>(background_dn + offset_dn);
+    const double raised_dn = std::max(threshold_dn + 0.5 - background_dn, 0.5);
     if (blob.pixels <= few_pixels) {
-      labeller.FindPeak(image, raised.blob);
-      if (GuessSpread(raised) < narrowest_px) {
+      labeller.FindPeak(image, blob);
+      if (GuessSpread(blob, background_dn, raised_dn) < narrowest_px) {
         ++found.levels.rejected_spots;
         continue;
       }
     }
     labeller.LookAt(image, MostSpotPixels(options.max_spread_px), blob);
-    raised.blob = blob;
+    const RaisedBlob raised{blob, background_dn, raised_dn};
     const SpotGuess guess = GuessSpot(raised, image.max_value);
     ++blobs;
     if (!splitter.Split(image, raised, guess, split)) ++found.levels.dropped_spots;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pose/centres/image_view.h"
+#include "pose/centres/vectors.h"
 
 namespace tbm {
 
@@ -21,7 +22,7 @@ class LevelMap {
   // The image is searched in blocks of this many columns and rows; two above each other have a
   // threshold of their own.
   static constexpr int kBlockWidth = 32;
-  static constexpr int kBlockHeight = 8;
+  static constexpr int kBlockHeight = kBlockRows;
 
   // Allocates only when the image has more tiles than any before.
   void Measure(const ImageView& image);

@@ -117,7 +117,7 @@ void RunLabeller::Scan(const ImageView& image, int row, int first, int last, int
 template void RunLabeller::Scan<std::uint8_t>(const ImageView&, int, int, int, int);
 template void RunLabeller::Scan<std::uint16_t>(const ImageView&, int, int, int, int);
 
-inline void RunLabeller::Append(int begin, int end, int threshold_dn) {
+void RunLabeller::Append(int begin, int end, int threshold_dn) {
   if (run_count_ == runs_.size()) {
     overflowed_ = true;
     return;
@@ -127,9 +127,15 @@ inline void RunLabeller::Append(int begin, int end, int threshold_dn) {
 }
 
 void RunLabeller::AddRuns(int row, int column, std::uint32_t bits, int threshold_dn) {
-  if (open_end_ >= 0) bits = GoOn(row, column, bits, threshold_dn);
-  if (bits == 0) return;
+  if (open_end_ >= 0) {
+    bits = GoOn(row, column, bits, threshold_dn);
+    if (bits == 0) return;
+  }
   if (row != row_) StartRow(row);
+  // Counted in a register; through the members every step would be stored and loaded again.
+  const auto room = static_cast<std::uint32_t>(runs_.size());
+  auto count = static_cast<std::uint32_t>(run_count_);
+  Run* run = runs_.data() + count;
   do {
     const int begin = std::countr_zero(bits);
     const int end = begin + std::countr_one(bits >> begin);
@@ -137,11 +143,18 @@ void RunLabeller::AddRuns(int row, int column, std::uint32_t bits, int threshold
       open_begin_ = column + begin;
       open_end_ = column + kBits;
       open_threshold_dn_ = threshold_dn;
-      return;
+      break;
     }
-    Append(column + begin, column + end, threshold_dn);
+    if (count == room) {
+      overflowed_ = true;
+      break;
+    }
+    *run = {row, column + begin, column + end, threshold_dn, count};
+    ++run;
+    ++count;
     bits &= ~std::uint32_t{0} << end;
   } while (bits != 0);
+  run_count_ = count;
 }
 
 // Adds to the open run what belongs to it; returns what does not.
@@ -201,7 +214,12 @@ std::span<Blob> RunLabeller::Finish() {
   for (std::uint32_t i = 0; i < run_count_; ++i) {
     Run& run = runs[i];
     if (run.parent == i) {
-      blobs[count] = {run.begin, run.end - 1, run.row, run.row, i, run.end - run.begin};
+      Blob& blob = blobs[count];
+      blob.left = run.begin;
+      blob.right = run.end - 1;
+      blob.top = blob.bottom = run.row;
+      blob.last_run = i;
+      blob.pixels = run.end - run.begin;
       blob_of_run[i] = count++;
       continue;
     }
@@ -219,6 +237,8 @@ std::span<Blob> RunLabeller::Finish() {
 }
 
 void RunLabeller::FindPeak(const ImageView& image, Blob& blob) const {
+  blob.peak_dn = 0;
+  blob.clipped = 0;
   const auto* first = static_cast<const std::byte*>(image.pixels);
   const bool is_byte = image.bytes_per_pixel == 1;
   for (std::uint32_t i = blob.last_run;; i = runs_[i].parent) {
@@ -235,6 +255,8 @@ void RunLabeller::FindPeak(const ImageView& image, Blob& blob) const {
 
 void RunLabeller::LookAt(const ImageView& image, int most_pixels, Blob& blob) const {
   const bool is_byte = image.bytes_per_pixel == 1;
+  blob.peak_dn = 0;
+  blob.clipped = 0;
   if (blob.pixels > most_pixels) {
     is_byte ? GlanceAt<std::uint8_t>(image, blob) : GlanceAt<std::uint16_t>(image, blob);
   } else {
@@ -279,7 +301,8 @@ void RunLabeller::SumRuns(const ImageView& image, Blob& blob) const {
 
 template <class Pixel>
 void RunLabeller::GlanceAt(const ImageView& image, Blob& blob) const {
-  constexpr int kEvery = 8;
+  constexpr int kEvery = 16;
+  blob.weight = 0;
   const auto* first = static_cast<const std::byte*>(image.pixels);
   const auto highest_dark = static_cast<Pixel>(
       std::min<std::uint32_t>(image.max_value - 1, std::numeric_limits<Pixel>::max()));

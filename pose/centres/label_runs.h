@@ -65,10 +65,10 @@ class RunLabeller {
   }
   // Valid until the next Clear.
   std::span<Blob> Finish();
-  // The brightest pixel alone.
+  // The brightest pixel alone; clipped pixels count as none.
   void FindPeak(const ImageView& image, Blob& blob) const;
   // Everything. A blob of more than `most_pixels` is no spot: it has no moments, and peak and
-  // clipped pixels are those of every eighth row.
+  // clipped pixels are those of every sixteenth row.
   void LookAt(const ImageView& image, int most_pixels, Blob& blob) const;
   bool overflowed() const { return overflowed_; }
 

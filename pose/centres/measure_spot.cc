@@ -27,7 +27,8 @@ constexpr int kQuickIterations = 8;
 constexpr double kNarrowest = 0.75;  // of the least spread: narrower along one axis is no spot
 // A window of at least so many rows is wide enough that every second row tells a smooth sum.
 constexpr int kFewRows = 15;
-// Around a window of at least so many rows every second row has pixels enough for the background.
+// Around a window of at least so many rows fewer than all rows have pixels enough for the
+// background.
 constexpr int kManyRows = 21;
 
 // A single pixel this many sigmas above the model is a hot one, if its neighbours do not share it.
@@ -118,7 +119,8 @@ SpotVerdict SpotMeter::MeasureOnce(const ImageView& image,
       patch_.Copy(image, Rounded(guess.u_px), Rounded(guess.v_px), half, frame_half);
   for (const SpotFit* other : others) patch_.RemoveLight(*other);
   const double noise_dn = std::sqrt(noise.dark_variance_dn2);
-  const int every = patch_.inner().height() >= (is_quick ? kFewRows : kManyRows) ? 2 : 1;
+  const int height = patch_.inner().height();
+  const int every = 1 + (height >= kManyRows) + (is_quick && height >= kFewRows);
   if (!patch_.FitBackground(noise_dn, guess.u_px, guess.v_px, every)) {
     return SpotVerdict::kNotASpot;
   }
@@ -283,7 +285,7 @@ SpotMeter::Scores SpotMeter::Score(const SpotFit& fit, double gain, int every) {
 }
 
 bool SpotMeter::Improve(double gain, Care care, SpotFit* fit) {
-  // The first step only has to come near: every second row tells the way. Later steps are too small
+  // The first step only has to come near: some of the rows tell the way. Later steps are too small
   // to change the weights.
   constexpr double kWeightsHold = 0.05;
   // Each step leaves a tenth of itself.
@@ -295,7 +297,7 @@ bool SpotMeter::Improve(double gain, Care care, SpotFit* fit) {
   for (int i = 0; i < most; ++i) {
     FillTables(*fit);
     const bool coarse = i == 0 && coarse_start;
-    const int every = coarse ? 2 : 1;
+    const int every = !coarse ? 1 : care == Care::kQuick ? 3 : 2;
     const bool weights_hold = longest < kWeightsHold && !(i == 1 && coarse_start);
     const Scores s = weights_hold          ? Score<Weighing::kKept>(*fit, gain, 1)
                      : patch_.has_masked() ? Score<Weighing::kFreshMasked>(*fit, gain, every)
@@ -348,6 +350,23 @@ void SpotMeter::MaskNearClipping(const SpotFit& fit, double gain, double full_dn
   }
 }
 
+// Any pixel of the row far above the model.
+bool SpotMeter::IsHot(int row, float amplitude) const {
+  const auto j = static_cast<std::size_t>(row - patch_.inner().top);
+  const std::size_t columns = RoundUpToLanes(patch_.inner().width());
+  const float* value = patch_.values(row);
+  const float* kept_weight = &weight_[j * columns];
+  const Floats amplitude_row = Spread(amplitude * At(rows_.data(), j).g);
+  const Floats zero = Spread(0.0f);
+  Floats hottest = zero;
+  const float* table = columns_.data();
+  for (std::size_t i = 0; i < columns; i += kLanes, table += kTableGroup) {
+    const Floats q = MulSub(Load(value + i), amplitude_row, Load(table));
+    hottest = Larger(hottest, Where(IsLess(zero, q), q * q * Load(kept_weight + i)));
+  }
+  return Any(IsLess(Spread(0.99f * kHotSigmas * kHotSigmas), hottest));
+}
+
 bool SpotMeter::MaskSingleBrightPixels(const SpotFit& fit, double gain) {
   const PixelBox& inner = patch_.inner();
   const std::size_t stride = patch_.stride();
@@ -356,6 +375,7 @@ bool SpotMeter::MaskSingleBrightPixels(const SpotFit& fit, double gain) {
   const auto dark = kHotSigmas * kHotSigmas * static_cast<float>(fit.background_variance_dn2);
   bool masked = false;
   for (int row = inner.top + 1; row < inner.bottom; ++row) {
+    if (!IsHot(row, amplitude)) continue;
     const float gauss_row = At(rows_.data(), static_cast<std::size_t>(row - inner.top)).g;
     const float* value = patch_.values(row);
     for (int i = 1; i + 1 < inner.width(); ++i) {

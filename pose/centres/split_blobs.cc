@@ -36,17 +36,15 @@ bool LooksLikeOneSpot(const RaisedBlob& raised,
 // The next higher cut, by one grey value at least; 0 when the top is reached. In steps fine enough
 // that one falls between a spot of half the brightness and the saddle to its neighbour 3.4 sigmas
 // away; two equal spots part at 0.87 of the peak when they are 2.4 sigmas apart. A streak that has
-// room for a few spots only is cut in large steps: what it is shows soon.
+// room for a few spots only is cut once, at half its height.
 // And so is what is too large for a spot: a lamp, in whose halo only bright spots can be told.
 double NextOffset(const RaisedBlob& raised, double elongation, int most_pixels) {
   constexpr int kFewSpotsPixels = 300;
   constexpr double kStreak = 4.0;
   const double amplitude_dn = raised.blob.peak_dn - raised.background_dn;
   if (elongation > kStreak && raised.blob.pixels < kFewSpotsPixels) {
-    for (const double share : {0.35, 0.62, 0.87}) {
-      if (share * amplitude_dn > 1.05 * raised.offset_dn + 1.0) return share * amplitude_dn;
-    }
-    return 0.0;
+    const double offset_dn = 0.5 * amplitude_dn;
+    return offset_dn > 1.05 * raised.offset_dn + 1.0 ? offset_dn : 0.0;
   }
   if (raised.blob.pixels > most_pixels) {
     for (const double share : {0.11, 0.3, 0.6}) {
@@ -65,10 +63,9 @@ double NextOffset(const RaisedBlob& raised, double elongation, int most_pixels) 
 
 }  // namespace
 
-double GuessSpread(const RaisedBlob& raised) {
-  const Blob& blob = raised.blob;
-  const double amplitude_dn = std::max(blob.peak_dn - raised.background_dn, 1.0);
-  const double log_height = std::max(LogOf(amplitude_dn / raised.offset_dn), 0.2);
+double GuessSpread(const Blob& blob, double background_dn, double offset_dn) {
+  const double amplitude_dn = std::max(blob.peak_dn - background_dn, 1.0);
+  const double log_height = std::max(LogOf(amplitude_dn / offset_dn), 0.2);
   return std::sqrt(std::max(blob.pixels - blob.clipped, 1) / (kTwoPi * log_height));
 }
 
@@ -83,7 +80,7 @@ SpotGuess GuessSpot(const RaisedBlob& raised, std::uint32_t max_value) {
   guess.elongation = shape.elongation;
   guess.background_dn = raised.background_dn;
   guess.amplitude_dn = std::max(blob.peak_dn - raised.background_dn, 1.0);
-  guess.spread_px = GuessSpread(raised);
+  guess.spread_px = GuessSpread(blob, raised.background_dn, raised.offset_dn);
   if (blob.clipped > 0) {
     const double area = kTwoPi * guess.spread_px * guess.spread_px;
     guess.amplitude_dn = ceiling_dn / DecayOf(std::min(blob.clipped / area, 4.0));

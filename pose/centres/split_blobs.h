@@ -29,7 +29,7 @@ struct RaisedBlob {
 // is clipped, the area of the clipped plateau gives the amplitude.
 SpotGuess GuessSpot(const RaisedBlob& raised, std::uint32_t max_value);
 // The spread alone, from area and peak.
-double GuessSpread(const RaisedBlob& raised);
+double GuessSpread(const Blob& blob, double background_dn, double offset_dn);
 
 // A blob of more pixels than this is no spot, however bright: its Gaussian's cut at 1/3000 of its
 // height would still be smaller.

@@ -21,6 +21,8 @@
 // - A product is rounded before it is added, also in MulAdd.
 namespace tbm {
 
+inline constexpr int kBlockRows = 8;
+
 template <class Pixel>
 inline Pixel LoadPixel(const std::byte* at) {
   Pixel pixel;
@@ -181,16 +183,16 @@ inline std::uint32_t SumOfLanes(const Pixels<Pixel>& a) {
   for (const Pixel lane : a.lane) sum += lane;
   return sum;
 }
-// The brightest of two neighbouring blocks of 32 columns and some rows, each in 16 bytes.
+// The brightest of two neighbouring blocks of 32 columns and kBlockRows rows, each in 16 bytes.
 template <class Pixel>
 struct BlockPair {
   Pixels<Pixel> left;
   Pixels<Pixel> right;
 };
 template <class Pixel>
-inline Pixels<Pixel> BrightestOfBlock(const std::byte* at, std::ptrdiff_t stride_bytes, int rows) {
+inline Pixels<Pixel> BrightestOfBlock(const std::byte* at, std::ptrdiff_t stride_bytes) {
   Pixels<Pixel> best = LoadPixels<Pixel>(at);
-  for (int row = 0; row < rows; ++row, at += stride_bytes) {
+  for (int row = 0; row < kBlockRows; ++row, at += stride_bytes) {
     for (std::size_t i = 0; i < 2 * sizeof(Pixel); ++i) {
       best = Brighter(best, LoadPixels<Pixel>(at + 16 * i));
     }
@@ -198,11 +200,9 @@ inline Pixels<Pixel> BrightestOfBlock(const std::byte* at, std::ptrdiff_t stride
   return best;
 }
 template <class Pixel>
-inline BlockPair<Pixel> BrightestOfBlocks(const std::byte* at,
-                                          std::ptrdiff_t stride_bytes,
-                                          int rows) {
-  return {BrightestOfBlock<Pixel>(at, stride_bytes, rows),
-          BrightestOfBlock<Pixel>(at + 32 * sizeof(Pixel), stride_bytes, rows)};
+inline BlockPair<Pixel> BrightestOfBlocks(const std::byte* at, std::ptrdiff_t stride_bytes) {
+  return {BrightestOfBlock<Pixel>(at, stride_bytes),
+          BrightestOfBlock<Pixel>(at + 32 * sizeof(Pixel), stride_bytes)};
 }
 // Bit i: pixel i of 32 is above the threshold.
 template <class Pixel>
@@ -321,9 +321,9 @@ struct BlockPair {
   Pixels<Pixel> right;
 };
 template <class Pixel>
-inline Pixels<Pixel> BrightestOfBlock(const std::byte* at, std::ptrdiff_t stride_bytes, int rows) {
+inline Pixels<Pixel> BrightestOfBlock(const std::byte* at, std::ptrdiff_t stride_bytes) {
   Pixels<Pixel> best = LoadPixels<Pixel>(at);
-  for (int row = 0; row < rows; ++row, at += stride_bytes) {
+  for (int row = 0; row < kBlockRows; ++row, at += stride_bytes) {
     for (std::size_t i = 0; i < 2 * sizeof(Pixel); ++i) {
       best = Brighter(best, LoadPixels<Pixel>(at + 16 * i));
     }
@@ -331,14 +331,12 @@ inline Pixels<Pixel> BrightestOfBlock(const std::byte* at, std::ptrdiff_t stride
   return best;
 }
 template <class Pixel>
-inline BlockPair<Pixel> BrightestOfBlocks(const std::byte* at,
-                                          std::ptrdiff_t stride_bytes,
-                                          int rows) {
+inline BlockPair<Pixel> BrightestOfBlocks(const std::byte* at, std::ptrdiff_t stride_bytes) {
   // Several maxima at a time hide the latency.
   constexpr std::size_t kRegisters = 2 * sizeof(Pixel);  // of one row of one block
   std::array<Pixels<Pixel>, 2 * kRegisters> best;
   for (std::size_t i = 0; i < 2 * kRegisters; ++i) best[i] = LoadPixels<Pixel>(at + 16 * i);
-  for (int row = 1; row < rows; ++row) {
+  for (int row = 1; row < kBlockRows; ++row) {
     at += stride_bytes;
     for (std::size_t i = 0; i < 2 * kRegisters; ++i) {
       best[i] = Brighter(best[i], LoadPixels<Pixel>(at + 16 * i));
@@ -509,9 +507,9 @@ struct BlockPair {
   Pixels<Pixel> right;
 };
 template <class Pixel>
-inline Pixels<Pixel> BrightestOfBlock(const std::byte* at, std::ptrdiff_t stride_bytes, int rows) {
+inline Pixels<Pixel> BrightestOfBlock(const std::byte* at, std::ptrdiff_t stride_bytes) {
   Pixels<Pixel> best = LoadPixels<Pixel>(at);
-  for (int row = 0; row < rows; ++row, at += stride_bytes) {
+  for (int row = 0; row < kBlockRows; ++row, at += stride_bytes) {
     for (std::size_t i = 0; i < 2 * sizeof(Pixel); ++i) {
       best = Brighter(best, LoadPixels<Pixel>(at + 16 * i));
     }
@@ -568,21 +566,18 @@ inline void FoldEightRows(const std::byte* at,
 #undef TBM_FOLD_EIGHT_ROWS
 #endif
 template <class Pixel>
-inline BlockPair<Pixel> BrightestOfBlocks(const std::byte* at,
-                                          std::ptrdiff_t stride_bytes,
-                                          int rows) {
-#if !defined(__aarch64__)
-  if (rows == 8) {
-    BlockPair<Pixel> pair;
-    detail::FoldEightRows(at, stride_bytes, pair);
-    if constexpr (sizeof(Pixel) == 1) return pair;
-    BlockPair<Pixel> next;
-    detail::FoldEightRows(at + 64, stride_bytes, next);
-    return {Brighter(pair.left, pair.right), Brighter(next.left, next.right)};
-  }
+inline BlockPair<Pixel> BrightestOfBlocks(const std::byte* at, std::ptrdiff_t stride_bytes) {
+#if defined(__aarch64__)
+  return {BrightestOfBlock<Pixel>(at, stride_bytes),
+          BrightestOfBlock<Pixel>(at + 32 * sizeof(Pixel), stride_bytes)};
+#else
+  BlockPair<Pixel> pair;
+  detail::FoldEightRows(at, stride_bytes, pair);
+  if constexpr (sizeof(Pixel) == 1) return pair;
+  BlockPair<Pixel> next;
+  detail::FoldEightRows(at + 64, stride_bytes, next);
+  return {Brighter(pair.left, pair.right), Brighter(next.left, next.right)};
 #endif
-  return {BrightestOfBlock<Pixel>(at, stride_bytes, rows),
-          BrightestOfBlock<Pixel>(at + 32 * sizeof(Pixel), stride_bytes, rows)};
 }
 inline bool AnyLane(Pixels<std::uint8_t> a) {
   const uint8x8_t folded = vorr_u8(vget_low_u8(a.v), vget_high_u8(a.v));
