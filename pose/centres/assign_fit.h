@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "pose/centres/assign_scene.h"
+#include "pose/solve/normal_equations.h"
 
 namespace tbm::assign {
 
@@ -24,7 +25,7 @@ enum class UsePrior { kNo, kYes };
 // and the prior when asked. Correlations between LEDs (intrinsics) are left to Judge.
 struct Fit {
   Rigid3 camera_from_target;
-  Information information = Information::Zero();
+  Factor6 factor;  // of its information, once Refine has been there
   double chi2 = 0.0;
 };
 

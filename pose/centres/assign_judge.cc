@@ -1,13 +1,14 @@
 #include "pose/centres/assign_judge.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "pose/solve/dense_cholesky.h"
 #include "pose/solve/linearised.h"
 
 namespace tbm::assign {
@@ -44,6 +45,29 @@ double LogBall(double chi2, int dimensions) {
   return half * std::log(std::numbers::pi * radius2) - LogFactorial(half);
 }
 
+// |det|, by elimination with the largest pivot of each column.
+double Determinant(Information rows) {
+  double product = 1.0;
+  for (int k = 0; k < 6; ++k) {
+    int largest = k;
+    for (int i = k + 1; i < 6; ++i) {
+      if (std::abs(rows(i, k)) > std::abs(rows(largest, k))) largest = i;
+    }
+    const double pivot = rows(largest, k);
+    if (pivot == 0.0) return 0.0;
+    if (largest != k) {
+      for (int j = k; j < 6; ++j) std::swap(rows(k, j), rows(largest, j));
+    }
+    product *= pivot;
+    const double inverse = 1.0 / pivot;
+    for (int i = k + 1; i < 6; ++i) {
+      const double factor = rows(i, k) * inverse;
+      for (int j = k + 1; j < 6; ++j) rows(i, j) -= factor * rows(k, j);
+    }
+  }
+  return std::abs(product);
+}
+
 // |det| of the derivative of as few rows as fix the pose, for the LEDs that fix it best.
 double LogBestBasis(const LinearisedProblem& linear, int leds) {
   Information rows = Information::Zero();
@@ -54,27 +78,29 @@ double LogBestBasis(const LinearisedProblem& linear, int leds) {
     for (int j = i + 1; j < leds; ++j) {
       rows.middleRows<2>(2) = linear.by_pose.middleRows<2>(2 * j);
       if (linear.tilt_rows > 0) {
-        best = std::max(best, std::abs(rows.determinant()));
+        best = std::max(best, Determinant(rows));
         continue;
       }
       for (int k = j + 1; k < leds; ++k) {
         rows.bottomRows<2>() = linear.by_pose.middleRows<2>(2 * k);
-        best = std::max(best, std::abs(rows.determinant()));
+        best = std::max(best, Determinant(rows));
       }
     }
   }
   return std::log(best);
 }
 
-template <class Factor>
-double LogDeterminant(const Factor& llt) {
-  return 2.0 * llt.matrixLLT().diagonal().array().log().sum();
+// Logarithm of the determinant of a factorised matrix.
+double LogDeterminant(const Factor6& factor) {
+  double product = 1.0;
+  for (int k = 0; k < 6; ++k) product *= factor.inverse_pivot[k];
+  return -std::log(product);
 }
 
 struct Solved {
   Information without_leds = Information::Zero();  // prior and tilts alone
-  Information information = Information::Zero();
-  double log_det_covariance = 0.0;  // of all rows
+  Factor6 factor;                                  // of the information of all
+  double log_det_covariance = 0.0;                 // of all rows
   double log_det_tilts = 0.0;
 };
 
@@ -89,18 +115,20 @@ double LogChance(const Scene& scene,
   const double log_area = std::log(scene.spot_area_px2);
   const double log_ways =
       LogWays(static_cast<int>(scene.rig->leds.size()), static_cast<int>(scene.spots.size()), leds);
-  const Eigen::LLT<Information> all(solved.information);
+  const double log_det_all = LogDeterminant(solved.factor);
   if (use_prior == UsePrior::kYes) {
-    const Eigen::LLT<Information> before(solved.without_leds);
+    Factor6 before;
+    if (!Factorise(solved.without_leds, 0.0, before))
+      return std::numeric_limits<double>::infinity();
     const double log_spread = 0.5 * (solved.log_det_covariance - solved.log_det_tilts +
-                                     LogDeterminant(all) - LogDeterminant(before));
+                                     log_det_all - LogDeterminant(before));
     return log_ways + LogBall(verdict.chi2, 2 * leds) + log_spread - leds * log_area;
   }
   const int basis_leds = linear.tilt_rows > 0 ? 2 : 3;
   const double log_roots = std::log(linear.tilt_rows > 0 ? 2.0 : 4.0);
   if (leds <= basis_leds) return log_roots + log_ways;
   const double log_spread =
-      0.5 * (solved.log_det_covariance + LogDeterminant(all)) - LogBestBasis(linear, leds);
+      0.5 * (solved.log_det_covariance + log_det_all) - LogBestBasis(linear, leds);
   const int free_leds = leds - basis_leds;
   return log_roots + log_ways + LogBall(verdict.chi2, 2 * free_leds) + log_spread -
          free_leds * log_area;
@@ -117,32 +145,40 @@ bool WithinDistances(const Scene& scene, const Verdict& verdict) {
 // One step of generalised least squares with the whole covariance, from the pose of the search.
 std::optional<Verdict> Judge(const Scene& scene, const Candidate& candidate, UsePrior use_prior) {
   const PoseProblem problem = ProblemOf(scene, candidate.matches);
-  const auto linear = Linearise(problem, candidate.fit.camera_from_target);
+  auto linear = Linearise(problem, candidate.fit.camera_from_target);
   if (!linear) return std::nullopt;
-  const Eigen::LLT<LinearisedProblem::RowsCovariance> noise(linear->covariance);
-  if (noise.info() != Eigen::Success) return std::nullopt;
-  const LinearisedProblem::Rows residual = noise.matrixL().solve(linear->residual);
-  const LinearisedProblem::RowsByPose by_pose = noise.matrixL().solve(linear->by_pose);
+  LinearisedProblem::Rows residual = linear->residual;
+  LinearisedProblem::RowsByPose by_pose = linear->by_pose;
+  const Eigen::Matrix2d tilt_covariance =
+      linear->tilt_rows > 0 ? Eigen::Matrix2d(linear->covariance.bottomRightCorner<2, 2>())
+                            : Eigen::Matrix2d(Eigen::Matrix2d::Identity());
+  if (!FactoriseCholesky(linear->covariance)) return std::nullopt;
+  SolveLower(linear->covariance, residual);
+  SolveLower(linear->covariance, by_pose);
 
   Solved solved;
-  PoseError gradient = by_pose.transpose() * residual;
+  Information information;
+  PoseError gradient;
+  NormalOf(by_pose, residual, information, gradient);
   double chi2 = residual.squaredNorm();
   if (use_prior == UsePrior::kYes) {
     const PoseError error =
         ErrorBetween(candidate.fit.camera_from_target, scene.prior->camera_from_target);
+    const PoseError pull = scene.prior->information.lazyProduct(error);
     solved.without_leds = scene.prior->information;
-    gradient += scene.prior->information * error;
-    chi2 += error.dot(scene.prior->information * error);
+    information += scene.prior->information;
+    gradient += pull;
+    chi2 += error.dot(pull);
   }
-  solved.information = solved.without_leds + by_pose.transpose() * by_pose;
   if (linear->tilt_rows > 0) {
     const Eigen::Matrix<double, 2, 6> tilt_rows = linear->by_pose.bottomRows<2>();
-    const Eigen::Matrix2d tilt_covariance = linear->covariance.bottomRightCorner<2, 2>();
-    solved.without_leds += tilt_rows.transpose() * tilt_covariance.inverse() * tilt_rows;
+    const Eigen::Matrix<double, 2, 6> weighted = tilt_covariance.inverse().lazyProduct(tilt_rows);
+    solved.without_leds += tilt_rows.transpose().lazyProduct(weighted);
     solved.log_det_tilts = std::log(tilt_covariance.determinant());
   }
-  solved.log_det_covariance = LogDeterminant(noise);
-  const PoseError move = solved.information.ldlt().solve(gradient);
+  solved.log_det_covariance = LogDeterminantOfFactor(linear->covariance);
+  if (!Factorise(information, 0.0, solved.factor)) return std::nullopt;
+  const PoseError move = SolveWith(solved.factor, gradient);
   if (!move.allFinite()) return std::nullopt;
 
   Verdict verdict;
@@ -168,17 +204,20 @@ struct Weakest {
 // of the spots left over would fall at least as near by chance, on this LED or another one without
 // a spot.
 Weakest WeakestLed(const Scene& scene, const Verdict& verdict, UsePrior use_prior) {
-  const auto linear = Linearise(ProblemOf(scene, verdict.matches), verdict.camera_from_target);
-  if (!linear) return {0, std::numeric_limits<double>::infinity()};
-  const Eigen::LLT<LinearisedProblem::RowsCovariance> noise(linear->covariance);
-  const LinearisedProblem::RowsByPose weighted_by_pose = noise.solve(linear->by_pose);
-  const LinearisedProblem::Rows weighted_residual = noise.solve(linear->residual);
-  Information information = linear->by_pose.transpose() * weighted_by_pose;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  auto linear = Linearise(ProblemOf(scene, verdict.matches), verdict.camera_from_target);
+  if (!linear || !FactoriseCholesky(linear->covariance)) return {0, kInfinity};
+  // Everything in rows of unit variance, L^-1 times: C^-1 is then a product of columns of L^-1.
+  SolveLower(linear->covariance, linear->by_pose);
+  SolveLower(linear->covariance, linear->residual);
+  LinearisedProblem::RowsCovariance inverse_root;
+  InvertLower(linear->covariance, inverse_root);
+  Information information;
+  PoseError gradient;
+  NormalOf(linear->by_pose, linear->residual, information, gradient);
   if (use_prior == UsePrior::kYes) information += scene.prior->information;
-  const Eigen::Index rows = linear->residual.size();
-  LinearisedProblem::RowsCovariance weight =
-      noise.solve(LinearisedProblem::RowsCovariance::Identity(rows, rows));
-  weight -= weighted_by_pose * information.ldlt().solve(weighted_by_pose.transpose());
+  Factor6 factor;
+  if (!Factorise(information, 0.0, factor)) return {0, kInfinity};
 
   const double others = static_cast<double>(verdict.matches.size()) - 1.0;
   const double free_leds = static_cast<double>(scene.rig->leds.size()) - others;
@@ -186,8 +225,23 @@ Weakest WeakestLed(const Scene& scene, const Verdict& verdict, UsePrior use_prio
   Weakest weakest;
   for (std::size_t i = 0; i < verdict.matches.size(); ++i) {
     const Eigen::Index row = 2 * static_cast<Eigen::Index>(i);
-    const Eigen::Matrix2d of_led = weight.block<2, 2>(row, row);
-    const Eigen::Vector2d pull = weighted_residual.segment<2>(row);
+    // The LED's block of C^-1 - C^-1 J (information)^-1 J^T C^-1, and of C^-1 residual.
+    Eigen::Matrix2d of_led;
+    Eigen::Vector2d pull;
+    std::array<PoseError, 2> by_pose;
+    for (Eigen::Index p = 0; p < 2; ++p) {
+      const auto root = inverse_root.col(row + p);
+      pull[p] = root.dot(linear->residual);
+      for (int k = 0; k < 6; ++k)
+        by_pose[static_cast<std::size_t>(p)][k] = root.dot(linear->by_pose.col(k));
+    }
+    for (Eigen::Index p = 0; p < 2; ++p) {
+      const PoseError explained = SolveWith(factor, by_pose[static_cast<std::size_t>(p)]);
+      for (Eigen::Index q = 0; q < 2; ++q) {
+        of_led(q, p) = inverse_root.col(row + q).dot(inverse_root.col(row + p)) -
+                       by_pose[static_cast<std::size_t>(q)].dot(explained);
+      }
+    }
     const double distance2 = pull.dot(of_led.inverse() * pull);
     const double log_chance = std::log(free_leds * free_spots) + LogBall(distance2, 2) -
                               0.5 * std::log(of_led.determinant()) - std::log(scene.spot_area_px2);

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <tuple>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 namespace tbm::assign {
@@ -32,16 +31,54 @@ Turning operator-(const Turning& a, const Turning& b) {
   return {a.along - b.along, a.flat - b.flat, a.across - b.across};
 }
 
+struct LedPair {
+  int i = 0;
+  int j = 0;
+  Turning baseline;  // from i to j
+  double length_m = 0.0;
+};
+
+// Two spots, and what is the same for all LEDs tried on them.
+struct SpotPair {
+  int a = 0;
+  int b = 0;
+  Eigen::Vector3d normal;  // of both rays
+  double normal_length = 0.0;
+  // From z_b ray_b - z_a ray_a = d: z_a = to_depth_a . d and z_b = to_depth_b . d.
+  Eigen::Vector3d to_depth_a;
+  Eigen::Vector3d to_depth_b;
+};
+
+// A length that changes with the yaw: constant + cosine cos yaw + sine sin yaw.
+struct Turned {
+  double constant = 0.0;
+  double cosine = 0.0;
+  double sine = 0.0;
+
+  double At(double cos_yaw, double sin_yaw) const {
+    return constant + cosine * cos_yaw + sine * sin_yaw;
+  }
+};
+
+Turned Along(const Eigen::Vector3d& direction, const Turning& turning) {
+  return {direction.dot(turning.along), direction.dot(turning.flat), direction.dot(turning.across)};
+}
+
 // A pair of LEDs on a pair of spots, and the pose that follows.
 struct PairPose {
   int led_i = 0;
   int led_j = 0;
   int spot_i = 0;
   int spot_j = 0;
+  double length_m = 0.0;  // between the LEDs
   double cos_yaw = 1.0;
   double sin_yaw = 0.0;
   double yaw_sigma_rad = 0.0;
+  double z_i_m = 0.0;       // depth of LED i
+  double z_i_next_m = 0.0;  // when the yaw is one sigma larger
 };
+
+double Length(double a, double b) { return std::sqrt(a * a + b * b); }
 
 class TiltSearch {
  public:
@@ -65,7 +102,12 @@ class TiltSearch {
     const int spots = std::min(static_cast<int>(scene_.spots.size()), kSeedSpotsWithTilts);
     for (int b = 1; b < spots; ++b) {
       for (int a = 0; a < b; ++a) {
-        for (const auto& [i, j] : led_pairs_) TryPair(i, j, a, b);
+        SpotPair spot_pair{a, b, Ray(a).cross(Ray(b)), 0.0, {}, {}};
+        const double normal2 = spot_pair.normal.squaredNorm();
+        spot_pair.normal_length = std::sqrt(normal2);
+        spot_pair.to_depth_a = spot_pair.normal.cross(Ray(b)) / normal2;
+        spot_pair.to_depth_b = spot_pair.normal.cross(Ray(a)) / normal2;
+        for (const LedPair& led_pair : led_pairs_) TryPair(led_pair, spot_pair);
       }
     }
     return any_pair_;
@@ -80,7 +122,9 @@ class TiltSearch {
       for (int i = 0; i < count; ++i) {
         const int j = (i + stride) % count;
         if (2 * stride == count && i >= j) continue;
-        if (!led_pairs_.full()) led_pairs_.push_back({i, j});
+        if (led_pairs_.full()) return;
+        const Turning baseline = LedAt(j) - LedAt(i);
+        led_pairs_.push_back({i, j, baseline, (baseline.along + baseline.flat).norm()});
       }
     }
   }
@@ -92,98 +136,85 @@ class TiltSearch {
   double SigmaPx(int spot) const { return scene_.spots[static_cast<std::size_t>(spot)].sigma_px; }
 
   // Yaw from n . R d = 0 with n the normal of both rays: A cos + B sin + C = 0.
-  void TryPair(int i, int j, int a, int b) {
-    const Turning baseline = LedAt(j) - LedAt(i);
-    const Eigen::Vector3d normal = Ray(a).cross(Ray(b));
-    const double cosine = normal.dot(baseline.flat);
-    const double sine = normal.dot(baseline.across);
-    const double constant = normal.dot(baseline.along);
-    const double amplitude2 = cosine * cosine + sine * sine;
-    const double root2 = amplitude2 - constant * constant;
+  void TryPair(const LedPair& leds, const SpotPair& spots) {
+    const Turned off_plane = Along(spots.normal, leds.baseline);
+    const double amplitude2 = off_plane.cosine * off_plane.cosine + off_plane.sine * off_plane.sine;
+    const double root2 = amplitude2 - off_plane.constant * off_plane.constant;
     if (!(root2 > 0.0)) return;
     const double root = std::sqrt(root2);
+    const double inverse2 = 1.0 / amplitude2;
+    const double foot = -off_plane.constant * inverse2;
+    const Turned depth_a = Along(spots.to_depth_a, leds.baseline);
+    const Turned depth_b = Along(spots.to_depth_b, leds.baseline);
     for (const double sign : {1.0, -1.0}) {
-      PairPose pair{i, j, a, b};
-      pair.cos_yaw = (-cosine * constant - sign * sine * root) / amplitude2;
-      pair.sin_yaw = (-sine * constant + sign * cosine * root) / amplitude2;
-      TryPose(baseline, normal, root, pair);
+      PairPose pair{leds.i, leds.j, spots.a, spots.b, leds.length_m};
+      const double aside = sign * root * inverse2;
+      pair.cos_yaw = off_plane.cosine * foot - off_plane.sine * aside;
+      pair.sin_yaw = off_plane.sine * foot + off_plane.cosine * aside;
+      double z_a_m = depth_a.At(pair.cos_yaw, pair.sin_yaw);
+      double z_b_m = depth_b.At(pair.cos_yaw, pair.sin_yaw);
+      const bool is_swapped = z_a_m < 0.0 && z_b_m < 0.0;
+      if (is_swapped) {
+        // The same two spots the other way round: same yaw, depths of the other sign.
+        std::swap(pair.spot_i, pair.spot_j);
+        z_a_m = -z_a_m;
+        z_b_m = -z_b_m;
+      }
+      if (!IsDistance(z_a_m) || !IsDistance(z_b_m)) continue;
+      any_pair_ = true;
+      const double ray_sigma =
+          Length(z_a_m * SigmaPx(spots.a), z_b_m * SigmaPx(spots.b)) / focal_px_;
+      pair.yaw_sigma_rad =
+          spots.normal_length * Length(ray_sigma, tilt_sigma_rad_ * leds.length_m) / root;
+      constexpr double kVagueYawRad = 0.06;
+      if (pair.yaw_sigma_rad > kVagueYawRad) continue;
+      const double cos_next = pair.cos_yaw - pair.yaw_sigma_rad * pair.sin_yaw;
+      const double sin_next = pair.sin_yaw + pair.yaw_sigma_rad * pair.cos_yaw;
+      pair.z_i_m = is_swapped ? z_b_m : z_a_m;
+      pair.z_i_next_m =
+          is_swapped ? -depth_b.At(cos_next, sin_next) : depth_a.At(cos_next, sin_next);
+      LookForThird(pair, cos_next, sin_next);
     }
-  }
-
-  // Depths along both rays, from z_j ray_j - z_i ray_i = R d.
-  std::array<double, 2> Depths(const Eigen::Vector3d& normal,
-                               const Eigen::Vector3d& baseline,
-                               const PairPose& pair) const {
-    const double scale = 1.0 / normal.squaredNorm();
-    return {scale * normal.dot(Ray(pair.spot_j).cross(baseline)),
-            scale * normal.dot(Ray(pair.spot_i).cross(baseline))};
   }
 
   bool IsDistance(double z_m) const {
     return z_m >= scene_.options.min_distance_m && z_m <= scene_.options.max_distance_m;
   }
 
-  void TryPose(const Turning& baseline, Eigen::Vector3d normal, double root, PairPose& pair) {
-    const Eigen::Vector3d turned = baseline.At(pair.cos_yaw, pair.sin_yaw);
-    std::array<double, 2> depths = Depths(normal, turned, pair);
-    if (depths[0] < 0.0 && depths[1] < 0.0) {
-      // The same two spots the other way round: same yaw, depths of the other sign.
-      std::swap(pair.spot_i, pair.spot_j);
-      normal = -normal;
-      depths = Depths(normal, turned, pair);
-    }
-    if (!IsDistance(depths[0]) || !IsDistance(depths[1])) return;
-    any_pair_ = true;
-    const double ray_sigma =
-        std::hypot(depths[0] * SigmaPx(pair.spot_i), depths[1] * SigmaPx(pair.spot_j)) / focal_px_;
-    pair.yaw_sigma_rad =
-        normal.norm() * std::hypot(ray_sigma, tilt_sigma_rad_ * turned.norm()) / root;
-    constexpr double kVagueYawRad = 0.06;
-    if (pair.yaw_sigma_rad > kVagueYawRad) return;
-    LookForThird(baseline, normal, depths, turned, pair);
-  }
-
-  // Pixel-scaled image of LED m, for the pose that puts LED i at depth z_i on its ray.
+  // Pixel-scaled image of an LED, for the pose that puts LED i at depth z_i on its ray.
   bool Image(const PairPose& pair,
              double z_i_m,
              const Eigen::Vector3d& arm,
              Eigen::Vector2d& image) const {
-    const Eigen::Vector3d p_in_camera = z_i_m * Ray(pair.spot_i) + arm;
-    if (!IsDistance(p_in_camera.z())) return false;
-    image = focal_px_ / p_in_camera.z() * p_in_camera.head<2>();
+    const Eigen::Vector3d& ray = Ray(pair.spot_i);
+    const double z_m = z_i_m + arm.z();
+    if (!IsDistance(z_m)) return false;
+    image = focal_px_ / z_m * (z_i_m * ray.head<2>() + arm.head<2>());
     return true;
   }
 
-  void LookForThird(const Turning& baseline,
-                    const Eigen::Vector3d& normal,
-                    const std::array<double, 2>& depths,
-                    const Eigen::Vector3d& turned,
-                    const PairPose& pair) {
+  void LookForThird(const PairPose& pair, double cos_next, double sin_next) {
     const double gate = scene_.options.gate_sigma + 0.5;
-    const double cos_next = pair.cos_yaw - pair.yaw_sigma_rad * pair.sin_yaw;
-    const double sin_next = pair.sin_yaw + pair.yaw_sigma_rad * pair.cos_yaw;
-    const std::array<double, 2> depths_next = Depths(normal, baseline.At(cos_next, sin_next), pair);
     const double pair_sigma_px = std::max(SigmaPx(pair.spot_i), SigmaPx(pair.spot_j));
-    const double length_m = turned.norm();
+    const double leverage_px = 2.0 * pair_sigma_px / pair.length_m;
+    const double tilt_px = focal_px_ * tilt_sigma_rad_ / pair.z_i_m;
     for (int m = 0; m < static_cast<int>(leds_.size()); ++m) {
       if (m == pair.led_i || m == pair.led_j) continue;
       const Turning arm = LedAt(m) - LedAt(pair.led_i);
       const Eigen::Vector3d arm_now = arm.At(pair.cos_yaw, pair.sin_yaw);
       Eigen::Vector2d image;
       Eigen::Vector2d image_next;
-      if (!Image(pair, depths[0], arm_now, image)) continue;
-      if (!Image(pair, depths_next[0], arm.At(cos_next, sin_next), image_next)) continue;
+      if (!Image(pair, pair.z_i_m, arm_now, image)) continue;
+      if (!Image(pair, pair.z_i_next_m, arm.At(cos_next, sin_next), image_next)) continue;
       const Eigen::Vector2d by_yaw = image_next - image;
-      const double leverage = 1.0 + 2.0 * arm_now.norm() / length_m;
-      const double tilt_px = focal_px_ * tilt_sigma_rad_ * arm_now.norm() / depths[0];
-      const double across_px =
-          0.2 + gate * (leverage * pair_sigma_px + tilt_px) + 0.1 * gate * by_yaw.norm();
-      TryThird(pair, depths[0], m, image, by_yaw, gate, across_px);
+      const double across_px = 0.2 +
+                               gate * (pair_sigma_px + (leverage_px + tilt_px) * arm_now.norm()) +
+                               0.1 * gate * by_yaw.norm();
+      TryThird(pair, m, image, by_yaw, gate, across_px);
     }
   }
 
   void TryThird(const PairPose& pair,
-                double z_i_m,
                 int led,
                 const Eigen::Vector2d& image,
                 const Eigen::Vector2d& by_yaw,
@@ -191,17 +222,23 @@ class TiltSearch {
                 double across_px) {
     const double by_yaw2 = by_yaw.squaredNorm();
     const double scale = by_yaw2 > 1e-12 ? 1.0 / by_yaw2 : 0.0;
+    const double across2 = across_px * across_px;
+    // Nothing further off in u passes.
+    const double reach_u = across_px + gate * std::abs(by_yaw.x());
     const int spots = static_cast<int>(scene_.spots.size());
     for (int s = 0; s < spots; ++s) {
-      const Eigen::Vector2d off = focal_px_ * Ray(s).head<2>() - image;
+      const Eigen::Vector3d& ray = Ray(s);
+      const double off_u = focal_px_ * ray.x() - image.x();
+      if (std::abs(off_u) > reach_u) continue;
+      const Eigen::Vector2d off(off_u, focal_px_ * ray.y() - image.y());
       const double along = std::clamp(scale * off.dot(by_yaw), -gate, gate);
-      if ((off - along * by_yaw).squaredNorm() > across_px * across_px) continue;
+      if ((off - along * by_yaw).squaredNorm() > across2) continue;
       if (s == pair.spot_i || s == pair.spot_j) continue;
-      TrySeed(pair, z_i_m, {led, s});
+      TrySeed(pair, {led, s});
     }
   }
 
-  void TrySeed(const PairPose& pair, double z_i_m, const Match& third) {
+  void TrySeed(const PairPose& pair, const Match& third) {
     Candidate seed;
     Insert(seed.matches, {pair.led_i, pair.spot_i});
     Insert(seed.matches, {pair.led_j, pair.spot_j});
@@ -212,7 +249,7 @@ class TiltSearch {
     Rigid3& pose = seed.fit.camera_from_target;
     pose.rotation = Eigen::AngleAxisd(yaw_rad, scene_.ups->up_in_camera) * level_from_target_;
     pose.translation =
-        z_i_m * Ray(pair.spot_i) -
+        pair.z_i_m * Ray(pair.spot_i) -
         pose.rotation * scene_.rig->leds[static_cast<std::size_t>(pair.led_i)].p_led_in_target;
     if (!Refine(scene_, seed.matches, UsePrior::kNo, seed.fit)) return;
     if (seed.fit.chi2 > Chi2Gate(2.0, scene_.options.gate_sigma)) return;
@@ -226,7 +263,7 @@ class TiltSearch {
   double tilt_sigma_rad_ = 0.0;
   double focal_px_ = 0.0;
   FixedVector<Turning, kMaxLeds> leds_;
-  FixedVector<std::pair<int, int>, kSeedLedPairs> led_pairs_;
+  FixedVector<LedPair, kSeedLedPairs> led_pairs_;
   bool any_pair_ = false;
   int refined_ = 0;
 };
@@ -236,23 +273,25 @@ struct Near {
   int spot = 0;
   double distance2 = 0.0;
 };
-using Nears = FixedVector<Near, kMaxCentres>;
+constexpr std::size_t kMostNears = 6;
+using Nears = FixedVector<Near, kMostNears>;
 
 Nears NearSpots(const Scene& scene, const Expected& expected, std::size_t most) {
-  Nears nears;
+  FixedVector<Near, kMaxCentres> all;
+  const double gate = scene.options.gate_sigma * scene.options.gate_sigma;
   for (int s = 0; s < static_cast<int>(scene.spots.size()); ++s) {
     const Spot& spot = scene.spots[static_cast<std::size_t>(s)];
     const Eigen::Vector2d off_px = spot.pixel_px - expected.pixel_px;
     Eigen::Matrix2d spread = expected.covariance;
     spread.diagonal().array() += spot.sigma_px * spot.sigma_px;
     const double distance2 = off_px.dot(spread.inverse() * off_px);
-    const double gate = scene.options.gate_sigma * scene.options.gate_sigma;
-    if (distance2 < gate) nears.push_back({s, distance2});
+    if (distance2 < gate) all.push_back({s, distance2});
   }
-  std::sort(nears.begin(), nears.end(), [](const Near& a, const Near& b) {
+  std::sort(all.begin(), all.end(), [](const Near& a, const Near& b) {
     return std::tie(a.distance2, a.spot) < std::tie(b.distance2, b.spot);
   });
-  if (nears.size() > most) nears.resize(most);
+  Nears nears;
+  for (std::size_t i = 0; i < std::min(all.size(), most); ++i) nears.push_back(all[i]);
   return nears;
 }
 
@@ -284,9 +323,9 @@ void SearchByPrior(const Scene& scene, Candidates& found) {
   Fit start;
   start.camera_from_target = scene.prior->camera_from_target;
   if (!Refine(scene, {}, UsePrior::kYes, start)) return;
-  const PoseCovariance covariance = start.information.ldlt().solve(PoseCovariance::Identity());
+  const PoseCovariance covariance = InverseOf(start.factor);
   const int leds = static_cast<int>(scene.rig->leds.size());
-  const std::size_t most = leds <= 6 ? 6 : 3;
+  const std::size_t most = leds <= 6 ? kMostNears : 3;
   FixedVector<Nears, kMaxLeds> nears;
   for (int led = 0; led < leds; ++led) {
     Expected expected;

@@ -1,25 +1,45 @@
 #include "pose/solve/whitened.h"
 
-#include <Eigen/Cholesky>
+#include <cmath>
+#include <utility>
+
+#include "pose/solve/dense_cholesky.h"
+#include "pose/solve/normal_equations.h"
 
 namespace tbm {
+namespace {
+
+// Takes out of `columns` what lies along `direction`, a unit vector.
+template <class Columns>
+void RemoveAlong(const LinearisedProblem::Rows& direction, Columns& columns) {
+  const Eigen::Index rows = direction.size();
+  for (Eigen::Index column = 0; column < columns.cols(); ++column) {
+    double along = 0.0;
+    for (Eigen::Index i = 0; i < rows; ++i) along += direction[i] * columns(i, column);
+    for (Eigen::Index i = 0; i < rows; ++i) columns(i, column) -= along * direction[i];
+  }
+}
+
+double SquaredLength(const LinearisedProblem::Rows& rows) {
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < rows.size(); ++i) sum += rows[i] * rows[i];
+  return sum;
+}
+
+}  // namespace
 
 std::optional<WhitenedProblem> WhitenedProblem::From(const PoseProblem& problem,
                                                      const Rigid3& pose) {
-  const auto linear = Linearise(problem, pose);
-  if (!linear) return std::nullopt;
-  const Eigen::LLT<LinearisedProblem::RowsCovariance> root(linear->covariance);
-  if (root.info() != Eigen::Success) return std::nullopt;
-  const auto lower = root.matrixL();
-  WhitenedProblem whitened;
-  whitened.by_pose_ = linear->by_pose;
-  whitened.residual_ = linear->residual;
-  whitened.inverse_root_.setIdentity(linear->residual.size(), linear->residual.size());
-  lower.solveInPlace(whitened.by_pose_);
-  lower.solveInPlace(whitened.residual_);
-  lower.solveInPlace(whitened.inverse_root_);
-  whitened.led_rows_ = linear->led_rows;
-  whitened.tilt_rows_ = linear->tilt_rows;
+  auto linear = Linearise(problem, pose);
+  if (!linear || !FactoriseCholesky(linear->covariance)) return std::nullopt;
+  std::optional<WhitenedProblem> whitened(std::in_place);
+  whitened->by_pose_ = linear->by_pose;
+  whitened->residual_ = linear->residual;
+  SolveLower(linear->covariance, whitened->by_pose_);
+  SolveLower(linear->covariance, whitened->residual_);
+  InvertLower(linear->covariance, whitened->inverse_root_);
+  whitened->led_rows_ = linear->led_rows;
+  whitened->tilt_rows_ = linear->tilt_rows;
   return whitened;
 }
 
@@ -27,36 +47,33 @@ SubsetNormal WhitenedProblem::Without(int omitted) const {
   SubsetNormal normal;
   normal.rows = static_cast<int>(residual_.size());
   if (omitted == kNothingOmitted) {
-    normal.information.noalias() = by_pose_.transpose() * by_pose_;
-    normal.gradient.noalias() = by_pose_.transpose() * residual_;
-    normal.residual_squared = residual_.squaredNorm();
+    NormalOf(by_pose_, residual_, normal.information, normal.gradient);
+    normal.residual_squared = SquaredLength(residual_);
     return normal;
   }
   LinearisedProblem::Rows first = inverse_root_.col(omitted);
   LinearisedProblem::Rows second = inverse_root_.col(omitted + 1);
-  first.normalize();
-  second -= first.dot(second) * first;
-  second.normalize();
+  first /= std::sqrt(SquaredLength(first));
+  RemoveAlong(first, second);
+  second /= std::sqrt(SquaredLength(second));
   LinearisedProblem::RowsByPose by_pose = by_pose_;
   LinearisedProblem::Rows residual = residual_;
   for (const auto* direction : {&first, &second}) {
-    const Eigen::Matrix<double, 1, 6> along = direction->transpose() * by_pose;
-    by_pose.noalias() -= *direction * along;
-    residual -= direction->dot(residual) * *direction;
+    RemoveAlong(*direction, by_pose);
+    RemoveAlong(*direction, residual);
   }
   normal.rows -= 2;
-  normal.information.noalias() = by_pose.transpose() * by_pose;
-  normal.gradient.noalias() = by_pose.transpose() * residual;
-  normal.residual_squared = residual.squaredNorm();
+  NormalOf(by_pose, residual, normal.information, normal.gradient);
+  normal.residual_squared = SquaredLength(residual);
   return normal;
 }
 
 std::optional<SubsetSolution> Solve(const SubsetNormal& normal) {
-  const Eigen::LLT<PoseCovariance> root(normal.information);
-  if (root.info() != Eigen::Success) return std::nullopt;
+  Factor6 factor;
+  if (!Factorise(normal.information, 0.0, factor)) return std::nullopt;
   SubsetSolution solution;
-  solution.e = root.solve(normal.gradient);
-  solution.covariance = root.solve(PoseCovariance::Identity());
+  solution.e = SolveWith(factor, normal.gradient);
+  solution.covariance = InverseOf(factor);
   solution.chi2 = normal.residual_squared - normal.gradient.dot(solution.e);
   return solution;
 }
