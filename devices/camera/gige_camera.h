@@ -32,7 +32,7 @@ namespace tbm {
 // runs. It is handed out, flagged, and not counted as incomplete.
 class GigeCamera final : public Camera {
  public:
-  static constexpr int kBuffers = 8;
+  static constexpr int kBuffers = 4;
   static constexpr Duration kFarewellPatience = std::chrono::seconds(1);
 
   GigeCamera(const CameraConfig& config, const Clock& clock);

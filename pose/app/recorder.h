@@ -50,7 +50,7 @@ class Recorder {
     PoseReason image_fault = PoseReason::kNone;
     std::size_t buffer = 0;
   };
-  static constexpr std::size_t kBuffers = 8;
+  static constexpr std::size_t kBuffers = 4;
   static constexpr std::size_t kQueue = 1024;
   // After a run that could not begin. Each attempt costs the solver its monitor's window.
   static constexpr std::chrono::seconds kTryAgain{60};

@@ -24,7 +24,8 @@ constexpr double kDarkest = 0.35;  // of full scale; exposure control aims at 0.
 constexpr double kBrightest = 0.95;
 constexpr double kSeenOften = 0.8;  // part of the frames
 constexpr double kTiltTooFar_deg = 15.0;
-constexpr double kTiltScatter = 6.0;  // times the rig's sigma
+constexpr double kTiltScatter = 6.0;                          // times the rig's sigma
+constexpr std::string_view kDeliveredRig = "NOT_CALIBRATED";  // tools/package/box/rig.yaml
 constexpr double kGoodReadings = 0.97;
 constexpr double kShareLost = 0.001;
 
@@ -253,6 +254,13 @@ void SelfTestCollector::Restart() {
 
 std::vector<Finding> JudgeHost(const HostFacts& host, const BoxConfig& config, const Rig& rig) {
   std::vector<Finding> findings;
+  if (rig.name == kDeliveredRig) {
+    Add(findings,
+        Verdict::kBad,
+        "rig file",
+        fmt::format("{} is still the one of the package, measured on no machine", config.rig_file),
+        "put the calibration of this box there");
+  }
   if (host.now < kProgramIsYounger) {
     Add(findings,
         Verdict::kBad,

@@ -72,7 +72,11 @@ std::vector<Finding> TryDds(const BoxConfig& config, const Clock& clock) {
     }
   }
   for (const std::string& complaint : complaints) {
-    findings.push_back({Verdict::kDoubtful, "DDS", complaint, "see idl/README.md, Alarms"});
+    findings.push_back(
+        {Verdict::kDoubtful,
+         "DDS",
+         complaint,
+         "another program on this network disturbs: /usr/share/doc/tbm-camera-box/README.md, 4.4"});
   }
   return findings;
 }

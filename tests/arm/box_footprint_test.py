@@ -11,9 +11,8 @@ import time
 
 import package_world as world
 
+# Also while it records and the disk stalls: the recorder then holds up to 4 images (Recorder::kBuffers).
 MEMORY_LIMIT_MB = 48.0
-# While the disk stalls, the recorder holds up to 8 images of 1280 x 1024 (Recorder::kBuffers).
-RECORDING_LIMIT_MB = MEMORY_LIMIT_MB + 8 * 1.31
 # A functional limit: camera opened, packet size found, inclinometers asked, readers discovered.
 FIRST_POSE_LIMIT_S = 5.0
 MEASURED_S = 6.0
@@ -82,7 +81,7 @@ def measure(checks, arguments, folder, processes, records):
     first_pose_s = reader.first_pose_at - began
     time.sleep(MEASURED_S)
     peak_mb = memory_mb(box, "VmHWM")
-    limit_mb = RECORDING_LIMIT_MB if records else MEMORY_LIMIT_MB
+    limit_mb = MEMORY_LIMIT_MB if records else MEMORY_LIMIT_MB
     print(f"figure: {'recording' if records else 'measuring'}: peak resident memory {peak_mb:.1f} MB (wanted "
           f"{limit_mb:.0f}), of it {memory_mb(box, 'RssFile'):.1f} MB of files; first pose after {first_pose_s:.2f} s "
           f"(wanted {FIRST_POSE_LIMIT_S:.0f})")

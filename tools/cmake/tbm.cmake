@@ -12,6 +12,10 @@ target_compile_options(tbm_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-restr
 target_compile_options(tbm_options INTERFACE -ffp-contract=off)
 if(TBM_SANITIZE)
   target_compile_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE} -fno-omit-frame-pointer)
+  if(TBM_SANITIZE MATCHES "undefined")
+    # What the address sanitizer sees anyway, at half of the compiler's time; vptr wants Fast DDS' own types.
+    target_compile_options(tbm_options INTERFACE -fno-sanitize=null,object-size,pointer-overflow,vptr)
+  endif()
   target_link_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE})
 endif()
 

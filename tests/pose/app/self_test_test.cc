@@ -135,6 +135,12 @@ TEST_F(SelfTest, EveryFaultOfTheHostHasItsOwnWord) {
               HasSubstr("subnet of 192.168.10.2"));
 }
 
+TEST_F(SelfTest, TheRigFileOfThePackageIsNoCalibration) {
+  const std::string delivered = TBM_SOURCE_DIR "/tools/package/box/rig.yaml";
+  const Rig rig = LoadRigFile(delivered).value().rig;
+  EXPECT_EQ(Of(JudgeHost(host_, config_, rig), "rig file").verdict, Verdict::kBad);
+}
+
 TEST_F(SelfTest, AHundredMegabitIsEnoughForASlowCamera) {
   host_.camera_link->speed_mbit_s = 100;
   config_.camera.frame_rate_hz = 5.0;
