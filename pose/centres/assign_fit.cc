@@ -108,7 +108,7 @@ bool SameMatches(const Matches& a, const Matches& b) {
   return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin());
 }
 
-bool Contains(const Matches& larger, const Matches& smaller) {
+bool Contains(const Matches& larger, std::span<const Match> smaller) {
   return std::all_of(smaller.begin(), smaller.end(), [&](const Match& match) {
     return std::find(larger.begin(), larger.end(), match) != larger.end();
   });

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "pose/centres/assign_scene.h"
 #include "pose/solve/normal_equations.h"
@@ -16,7 +17,7 @@ struct Match {
 using Matches = FixedVector<Match, kMaxLeds>;  // by rising LED, each LED and each spot once
 
 bool SameMatches(const Matches& a, const Matches& b);
-bool Contains(const Matches& larger, const Matches& smaller);
+bool Contains(const Matches& larger, std::span<const Match> smaller);
 void Insert(Matches& matches, const Match& match);
 
 enum class UsePrior { kNo, kYes };

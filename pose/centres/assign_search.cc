@@ -239,12 +239,12 @@ class TiltSearch {
   }
 
   void TrySeed(const PairPose& pair, const Match& third) {
-    Candidate seed;
-    Insert(seed.matches, {pair.led_i, pair.spot_i});
-    Insert(seed.matches, {pair.led_j, pair.spot_j});
-    Insert(seed.matches, third);
-    if (found_.Covers(seed.matches) || refined_ >= kMaxRefinedSeeds) return;
+    const std::array<Match, 3> matches = {
+        Match{pair.led_i, pair.spot_i}, Match{pair.led_j, pair.spot_j}, third};
+    if (found_.Covers(matches) || refined_ >= kMaxRefinedSeeds) return;
     ++refined_;
+    Candidate seed;
+    for (const Match& match : matches) Insert(seed.matches, match);
     const double yaw_rad = std::atan2(pair.sin_yaw, pair.cos_yaw);
     Rigid3& pose = seed.fit.camera_from_target;
     pose.rotation = Eigen::AngleAxisd(yaw_rad, scene_.ups->up_in_camera) * level_from_target_;
@@ -311,7 +311,7 @@ void Candidates::Offer(const Candidate& candidate) {
   }
 }
 
-bool Candidates::Covers(const Matches& matches) const {
+bool Candidates::Covers(std::span<const Match> matches) const {
   return std::any_of(list_.begin(), list_.end(), [&](const Candidate& candidate) {
     return Contains(candidate.matches, matches);
   });
@@ -338,11 +338,11 @@ void SearchByPrior(const Scene& scene, Candidates& found) {
       for (const Near& near_i : nears[static_cast<std::size_t>(i)]) {
         for (const Near& near_j : nears[static_cast<std::size_t>(j)]) {
           if (near_i.spot == near_j.spot) continue;
-          Candidate seed;
-          Insert(seed.matches, {i, near_i.spot});
-          Insert(seed.matches, {j, near_j.spot});
-          if (found.Covers(seed.matches) || refined >= kMaxRefinedSeeds) continue;
+          const std::array<Match, 2> matches = {Match{i, near_i.spot}, Match{j, near_j.spot}};
+          if (found.Covers(matches) || refined >= kMaxRefinedSeeds) continue;
           ++refined;
+          Candidate seed;
+          for (const Match& match : matches) Insert(seed.matches, match);
           seed.fit = start;
           if (!Refine(scene, seed.matches, UsePrior::kYes, seed.fit)) continue;
           if (!Extend(scene, UsePrior::kYes, seed.matches, seed.fit)) continue;

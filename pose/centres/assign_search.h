@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include "pose/centres/assign_fit.h"
 
 namespace tbm::assign {
@@ -15,7 +17,7 @@ class Candidates {
  public:
   void Offer(const Candidate& candidate);
   // Whether some candidate already holds all of these matches.
-  bool Covers(const Matches& matches) const;
+  bool Covers(std::span<const Match> matches) const;
   std::size_t size() const { return list_.size(); }
   const Candidate& operator[](std::size_t i) const { return list_[i]; }
   const Candidate* begin() const { return list_.begin(); }

@@ -146,21 +146,26 @@ void FormNormal(const LinearPose& linear, const Weights& weights, NormalEquation
   }
 }
 
+// Loops of six, unrolled: their counters would cost as much as what they count.
 bool Factorise(const Eigen::Matrix<double, 6, 6>& information, double damping, Factor6& factor) {
   // A pivot this far below its diagonal is what rounding leaves of zero.
   constexpr double kSingular = 1e-14;
   Eigen::Matrix<double, 6, 6>& lower = factor.lower;
   lower = information;
+#pragma GCC unroll 6
   for (int k = 0; k < 6; ++k) {
     const double diagonal = information(k, k);
     const double pivot = lower(k, k) + damping * diagonal;
     if (!(pivot > kSingular * diagonal)) return false;
     const double inverse_pivot = 1.0 / pivot;
     factor.inverse_pivot[k] = inverse_pivot;
+#pragma GCC unroll 6
     for (int i = k + 1; i < 6; ++i) {
       const double ratio = lower(i, k) * inverse_pivot;
+#pragma GCC unroll 6
       for (int j = k + 1; j <= i; ++j) lower(i, j) -= ratio * lower(j, k);
     }
+#pragma GCC unroll 6
     for (int i = k + 1; i < 6; ++i) lower(i, k) *= inverse_pivot;
   }
   return true;
@@ -169,11 +174,15 @@ bool Factorise(const Eigen::Matrix<double, 6, 6>& information, double damping, F
 Eigen::Matrix<double, 6, 1> SolveWith(const Factor6& factor,
                                       const Eigen::Matrix<double, 6, 1>& right) {
   Eigen::Matrix<double, 6, 1> x = right;
+#pragma GCC unroll 6
   for (int k = 0; k < 6; ++k) {
+#pragma GCC unroll 6
     for (int i = k + 1; i < 6; ++i) x[i] -= factor.lower(i, k) * x[k];
   }
   x.array() *= factor.inverse_pivot.array();
+#pragma GCC unroll 6
   for (int k = 5; k >= 0; --k) {
+#pragma GCC unroll 6
     for (int i = 0; i < k; ++i) x[i] -= factor.lower(k, i) * x[k];
   }
   return x;
@@ -182,17 +191,23 @@ Eigen::Matrix<double, 6, 1> SolveWith(const Factor6& factor,
 Eigen::Matrix<double, 6, 6> InverseOf(const Factor6& factor) {
   // Rows of L^-1, then L^-T D^-1 L^-1.
   Eigen::Matrix<double, 6, 6> inverse_lower = Eigen::Matrix<double, 6, 6>::Identity();
+#pragma GCC unroll 6
   for (int j = 0; j < 6; ++j) {
+#pragma GCC unroll 6
     for (int i = j + 1; i < 6; ++i) {
       double sum = factor.lower(i, j);
+#pragma GCC unroll 6
       for (int k = j + 1; k < i; ++k) sum += factor.lower(i, k) * inverse_lower(k, j);
       inverse_lower(i, j) = -sum;
     }
   }
   Eigen::Matrix<double, 6, 6> inverse;
+#pragma GCC unroll 6
   for (int a = 0; a < 6; ++a) {
+#pragma GCC unroll 6
     for (int b = 0; b <= a; ++b) {
       double sum = 0.0;
+#pragma GCC unroll 6
       for (int k = a; k < 6; ++k) {
         sum += inverse_lower(k, a) * factor.inverse_pivot[k] * inverse_lower(k, b);
       }

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
 #include "pose/solve/integrity.h"
+#include "pose/solve/normal_equations.h"
 #include "pose/solve/tails.h"
 #include "pose/solve/whitened.h"
 
@@ -69,9 +69,9 @@ class Explanations {
       : published_(published), prior_(prior), options_(options) {
     at_published_ = WhitenedProblem::From(problem, published);
     if (!prior) return;
-    const Eigen::LLT<PoseCovariance> root(prior->covariance);
-    if (root.info() != Eigen::Success) return;
-    prior_information_ = root.solve(PoseCovariance::Identity());
+    Factor6 factor;
+    if (!Factorise(prior->covariance, 0.0, factor)) return;
+    prior_information_ = InverseOf(factor);
     at_prior_ = WhitenedProblem::From(problem, prior->camera_from_target);
   }
 
@@ -101,27 +101,26 @@ class Explanations {
   std::optional<WhitenedProblem> at_prior_;
 };
 
-// All explanations with at most one wrong reading that the residuals allow. Empty when one of them
+// All explanations with at most one wrong reading that the residuals allow. False when one of them
 // leaves the pose unlimited.
-std::optional<Hypotheses> PlausibleHypotheses(const PoseProblem& problem,
-                                              const Rigid3& published,
-                                              const std::optional<PosePriorInfo>& prior,
-                                              const IntegrityOptions& options) {
+bool FindPlausible(const PoseProblem& problem,
+                   const Rigid3& published,
+                   const std::optional<PosePriorInfo>& prior,
+                   const IntegrityOptions& options,
+                   Hypotheses& plausible) {
   const Explanations explanations(problem, published, prior, options);
-  Hypotheses plausible;
   const auto add = [&](int omitted) {
     const auto hypothesis = explanations.Without(omitted);
     if (hypothesis && hypothesis->plausible) plausible.push_back(*hypothesis);
     return hypothesis.has_value();
   };
-  if (!add(kNothingOmitted)) return std::nullopt;
+  if (!add(kNothingOmitted)) return false;
   const bool has_tilts = problem.target_tilt && problem.camera_tilt;
   const int pairs_of_rows = static_cast<int>(problem.leds.size()) + (has_tilts ? 1 : 0);
   for (int i = 0; i < pairs_of_rows; ++i) {
-    if (!add(2 * i)) return std::nullopt;
+    if (!add(2 * i)) return false;
   }
-  if (plausible.empty()) return std::nullopt;
-  return plausible;
+  return !plausible.empty();
 }
 
 Eigen::Matrix3d PointCovariance(const Rigid3& pose,
@@ -157,13 +156,14 @@ PointResults CheckPoints(const PoseProblem& problem,
                          const std::optional<PosePriorInfo>& prior,
                          const IntegrityOptions& options) {
   const Rigid3& published = checked.pose.camera_from_target;
-  const auto hypotheses = PlausibleHypotheses(problem, published, prior, options);
+  Hypotheses hypotheses;
+  const bool is_limited = FindPlausible(problem, published, prior, options, hypotheses);
   PointResults results;
   for (const NamedPoint& point : problem.rig->points) {
     PointResult result;
     result.p_in_camera = published * point.p_point_in_target;
     result.sigma_m = std::sqrt(PointCovariance(published, point, checked.pose.covariance).trace());
-    if (hypotheses) result.bound_m = Bound(point, published, *hypotheses, options);
+    if (is_limited) result.bound_m = Bound(point, published, hypotheses, options);
     results.push_back(result);
   }
   return results;

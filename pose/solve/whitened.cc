@@ -9,21 +9,28 @@
 namespace tbm {
 namespace {
 
-// Takes out of `columns` what lies along `direction`, a unit vector.
-template <class Columns>
-void RemoveAlong(const LinearisedProblem::Rows& direction, Columns& columns) {
-  const Eigen::Index rows = direction.size();
-  for (Eigen::Index column = 0; column < columns.cols(); ++column) {
-    double along = 0.0;
-    for (Eigen::Index i = 0; i < rows; ++i) along += direction[i] * columns(i, column);
-    for (Eigen::Index i = 0; i < rows; ++i) columns(i, column) -= along * direction[i];
-  }
+double Dot(const LinearisedProblem::Rows& a, const LinearisedProblem::Rows& b) {
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
 }
 
-double SquaredLength(const LinearisedProblem::Rows& rows) {
-  double sum = 0.0;
-  for (Eigen::Index i = 0; i < rows.size(); ++i) sum += rows[i] * rows[i];
-  return sum;
+// Takes out of the normal equations what lies along `direction`, a unit vector, in the rows.
+void TakeOut(const LinearisedProblem::Rows& direction,
+             const LinearisedProblem::RowsByPose& by_pose,
+             const LinearisedProblem::Rows& residual,
+             SubsetNormal& normal) {
+  double along[6];
+  for (int a = 0; a < 6; ++a) {
+    along[a] = 0.0;
+    for (Eigen::Index i = 0; i < direction.size(); ++i) along[a] += direction[i] * by_pose(i, a);
+  }
+  const double of_residual = Dot(direction, residual);
+  for (int a = 0; a < 6; ++a) {
+    for (int b = 0; b < 6; ++b) normal.information(a, b) -= along[a] * along[b];
+    normal.gradient[a] -= along[a] * of_residual;
+  }
+  normal.residual_squared -= of_residual * of_residual;
 }
 
 }  // namespace
@@ -40,31 +47,24 @@ std::optional<WhitenedProblem> WhitenedProblem::From(const PoseProblem& problem,
   InvertLower(linear->covariance, whitened->inverse_root_);
   whitened->led_rows_ = linear->led_rows;
   whitened->tilt_rows_ = linear->tilt_rows;
+  SubsetNormal& all = whitened->all_;
+  all.rows = static_cast<int>(whitened->residual_.size());
+  NormalOf(whitened->by_pose_, whitened->residual_, all.information, all.gradient);
+  all.residual_squared = Dot(whitened->residual_, whitened->residual_);
   return whitened;
 }
 
 SubsetNormal WhitenedProblem::Without(int omitted) const {
-  SubsetNormal normal;
-  normal.rows = static_cast<int>(residual_.size());
-  if (omitted == kNothingOmitted) {
-    NormalOf(by_pose_, residual_, normal.information, normal.gradient);
-    normal.residual_squared = SquaredLength(residual_);
-    return normal;
-  }
+  if (omitted == kNothingOmitted) return all_;
   LinearisedProblem::Rows first = inverse_root_.col(omitted);
   LinearisedProblem::Rows second = inverse_root_.col(omitted + 1);
-  first /= std::sqrt(SquaredLength(first));
-  RemoveAlong(first, second);
-  second /= std::sqrt(SquaredLength(second));
-  LinearisedProblem::RowsByPose by_pose = by_pose_;
-  LinearisedProblem::Rows residual = residual_;
-  for (const auto* direction : {&first, &second}) {
-    RemoveAlong(*direction, by_pose);
-    RemoveAlong(*direction, residual);
-  }
+  first /= std::sqrt(Dot(first, first));
+  second -= Dot(first, second) * first;
+  second /= std::sqrt(Dot(second, second));
+  SubsetNormal normal = all_;
   normal.rows -= 2;
-  NormalOf(by_pose, residual, normal.information, normal.gradient);
-  normal.residual_squared = SquaredLength(residual);
+  TakeOut(first, by_pose_, residual_, normal);
+  TakeOut(second, by_pose_, residual_, normal);
   return normal;
 }
 

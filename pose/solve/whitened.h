@@ -29,6 +29,9 @@ struct SubsetSolution {
 // A linearised problem with independent rows of unit variance.
 class WhitenedProblem {
  public:
+  WhitenedProblem() {
+  }  // nothing in it; not defaulted, which would fill the room for 66 rows with zeros
+
   // Empty when Linearise has nothing to say or the covariance is not positive definite.
   static std::optional<WhitenedProblem> From(const PoseProblem& problem, const Rigid3& pose);
 
@@ -44,6 +47,7 @@ class WhitenedProblem {
   LinearisedProblem::RowsByPose by_pose_;
   LinearisedProblem::Rows residual_;
   LinearisedProblem::RowsCovariance inverse_root_;  // L^-1 of covariance = L L^T
+  SubsetNormal all_;                                // nothing left out
   int led_rows_ = 0;
   int tilt_rows_ = 0;
 };
