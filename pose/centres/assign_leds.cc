@@ -18,13 +18,23 @@ Decision DecideByImage(const Scene& scene, const Candidates& by_image, bool any_
   return decision;
 }
 
+// One that has every LED of the rig and agrees with the prior: its rivals must have as many, and
+// with sharp tilts the image alone has brought them all.
+bool ExplainsAll(const Scene& scene, const Candidates& by_prior) {
+  if (!scene.ups_are_sharp || by_prior.size() == 0) return false;
+  const Candidate& best = by_prior[0];
+  const std::size_t leds = scene.rig->leds.size();
+  const double dof = 2.0 * static_cast<double>(leds) + 2.0;
+  return best.matches.size() == leds && best.fit.chi2 <= Chi2Gate(dof, scene.options.gate_sigma);
+}
+
 Decision DecideByPrior(const Scene& scene, const Candidates& by_image) {
   Candidates by_prior;
   for (const Candidate& seen : by_image) {
     Candidate candidate = seen;
     if (Refine(scene, candidate.matches, UsePrior::kYes, candidate.fit)) by_prior.Offer(candidate);
   }
-  SearchByPrior(scene, by_prior);
+  if (!ExplainsAll(scene, by_prior)) SearchByPrior(scene, by_prior);
   return Decide(scene, by_prior, UsePrior::kYes);
 }
 

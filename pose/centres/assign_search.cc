@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <tuple>
+#include <utility>
 
 #include <Eigen/LU>
 
@@ -298,21 +300,21 @@ Nears NearSpots(const Scene& scene, const Expected& expected, std::size_t most) 
 }  // namespace
 
 void Candidates::Offer(const Candidate& candidate) {
-  for (const Candidate& known : list_) {
+  for (const Candidate& known : *this) {
     if (SameMatches(known.matches, candidate.matches)) return;
   }
-  if (list_.full()) {
-    if (!Better(candidate, list_.back())) return;
-    list_.erase(list_.size() - 1);
+  if (size_ == kRoom) {
+    if (!Better(candidate, *At(kRoom - 1))) return;
+    --size_;
   }
-  list_.push_back(candidate);
-  for (std::size_t i = list_.size() - 1; i > 0 && Better(list_[i], list_[i - 1]); --i) {
-    std::swap(list_[i], list_[i - 1]);
+  std::construct_at(At(size_), candidate);
+  for (std::size_t i = size_++; i > 0 && Better(*At(i), *At(i - 1)); --i) {
+    std::swap(*At(i), *At(i - 1));
   }
 }
 
 bool Candidates::Covers(std::span<const Match> matches) const {
-  return std::any_of(list_.begin(), list_.end(), [&](const Candidate& candidate) {
+  return std::any_of(begin(), end(), [&](const Candidate& candidate) {
     return Contains(candidate.matches, matches);
   });
 }

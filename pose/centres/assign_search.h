@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <span>
 
 #include "pose/centres/assign_fit.h"
@@ -15,17 +17,25 @@ struct Candidate {
 // worse than all of a full list is not kept.
 class Candidates {
  public:
+  Candidates() = default;
+  Candidates(const Candidates&) = delete;
+  Candidates& operator=(const Candidates&) = delete;
+
   void Offer(const Candidate& candidate);
   // Whether some candidate already holds all of these matches.
   bool Covers(std::span<const Match> matches) const;
-  std::size_t size() const { return list_.size(); }
-  const Candidate& operator[](std::size_t i) const { return list_[i]; }
-  const Candidate* begin() const { return list_.begin(); }
-  const Candidate* end() const { return list_.end(); }
+  std::size_t size() const { return size_; }
+  const Candidate& operator[](std::size_t i) const { return begin()[i]; }
+  const Candidate* begin() const { return reinterpret_cast<const Candidate*>(room_.data()); }
+  const Candidate* end() const { return begin() + size_; }
 
  private:
   static constexpr std::size_t kRoom = 48;
-  FixedVector<Candidate, kRoom> list_;
+  Candidate* At(std::size_t i) { return reinterpret_cast<Candidate*>(room_.data()) + i; }
+
+  // Not an array of candidates: it would be filled with empty ones first.
+  alignas(Candidate) std::array<std::byte, kRoom * sizeof(Candidate)> room_;
+  std::size_t size_ = 0;
 };
 
 // Bounds of the work. Beyond them the faintest spots, then the last LED pairs, are not tried as
