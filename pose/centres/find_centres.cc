@@ -14,14 +14,13 @@
 #include "pose/centres/image_levels.h"
 #include "pose/centres/label_runs.h"
 #include "pose/centres/measure_spot.h"
+#include "pose/centres/scan_image.h"
 #include "pose/centres/split_blobs.h"
 #include "pose/centres/vectors.h"
 
 namespace tbm {
 namespace {
 
-constexpr int kBlockWidth = LevelMap::kBlockWidth;
-constexpr int kBlockHeight = LevelMap::kBlockHeight;
 constexpr std::size_t kMaxRuns = 32768;
 constexpr std::size_t kMaxNeighbours = 8;
 constexpr int kMaxRounds = 10;       // of correcting neighbours for each other's light
@@ -43,19 +42,6 @@ constexpr double kNarrowGuess = 1.1;
 constexpr double kLongGuess = 1.3;
 // What rises so little above the threshold's offset says nothing of its width.
 constexpr double kFaintest = 1.25;
-
-// A block of the strip that is being searched.
-struct BrightBlock {
-  int column;
-  int offset_bytes;  // from the row's first pixel
-  int threshold_dn;
-};
-
-template <class Pixel>
-BrightBlock BlockAt(std::size_t index, int threshold_dn) {
-  const int column = static_cast<int>(index) * kBlockWidth;
-  return {column, column * int{sizeof(Pixel)}, threshold_dn};
-}
 
 struct Candidate {
   SpotGuess guess;
@@ -175,26 +161,18 @@ struct CentreFinder::WorkSpace {
   }
 
   LevelMap levels;
+  ImageScanner scanner;
   RunLabeller labeller;
   BlobSplitter splitter;
   SpotMeter meter;
   std::vector<Candidate> candidates;
   std::vector<std::size_t> order;
   std::vector<double> sorted;
-  std::vector<BrightBlock> bright_blocks;
   FoundCentres found;
   double offset_dn = 0.0;  // of the threshold above the level
   double gain = 0.0;
   bool is_crowd = false;
 
-  template <class Pixel>
-  void ScanImage(const ImageView& image);
-  template <class Pixel>
-  void FindBrightBlocks(const std::byte* first,
-                        const ImageView& image,
-                        std::span<const int> thresholds);
-  template <class Pixel>
-  void TakeAllBlocks(const ImageView& image, std::span<const int> thresholds);
   std::size_t CollectGuesses(const ImageView& image, const FinderOptions& options);
   void ChooseCandidates(const ImageView& image, const FinderOptions& options);
   void MeasureAll(const ImageView& image, const FinderOptions& options);
@@ -220,8 +198,6 @@ Result<const FoundCentres*, ImageFailure> CentreFinder::Find(const ImageView& im
   TBM_CHECK(image.width_px >= 0 && image.height_px >= 0 && image.max_value > 0);
   TBM_CHECK(image.stride_bytes >= std::ptrdiff_t{image.bytes_per_pixel} * image.width_px);
   WorkSpace& work = *work_;
-  const auto blocks = static_cast<std::size_t>(image.width_px / kBlockWidth + 1);
-  work.bright_blocks.reserve(blocks);
   work.found.centres.clear();
   work.found.levels = {};
   if (image.width_px == 0 || image.height_px == 0) return Failure{ImageFailure::kDark};
@@ -238,11 +214,7 @@ Result<const FoundCentres*, ImageFailure> CentreFinder::Find(const ImageView& im
       {0.6 * options_.min_snr * work.found.levels.noise_dn, kLowestOffset * image.max_value, 1.0});
   do {
     work.labeller.Clear();
-    if (image.bytes_per_pixel == 1) {
-      work.ScanImage<std::uint8_t>(image);
-    } else {
-      work.ScanImage<std::uint16_t>(image);
-    }
+    work.scanner.Scan(image, work.offset_dn, work.levels, work.labeller);
     if (!work.labeller.overflowed()) break;
     work.offset_dn *= 2.0;
   } while (work.offset_dn < image.max_value);
@@ -250,94 +222,6 @@ Result<const FoundCentres*, ImageFailure> CentreFinder::Find(const ImageView& im
   work.MeasureAll(image, options_);
   work.Report(options_);
   return &work.found;
-}
-
-// The one pass over the image: the brightest pixels of each block against its threshold. Only
-// blocks that exceed it are looked at again, while they are in the cache.
-template <class Pixel>
-void CentreFinder::WorkSpace::ScanImage(const ImageView& image) {
-  const auto* first = static_cast<const std::byte*>(image.pixels);
-  const int highest =
-      static_cast<int>(std::min<std::uint32_t>(image.max_value, std::numeric_limits<Pixel>::max()));
-  const int columns = image.width_px / kBlockWidth * kBlockWidth;
-  std::span<const int> thresholds;
-  for (int row = 0; row < image.height_px; row += kBlockHeight) {
-    const int rows = std::min(kBlockHeight, image.height_px - row);
-    if (row % (2 * kBlockHeight) == 0) thresholds = levels.Thresholds(row, offset_dn, highest);
-    if (rows == kBlockHeight) {
-      FindBrightBlocks<Pixel>(first + row * image.stride_bytes, image, thresholds);
-    } else {
-      TakeAllBlocks<Pixel>(image, thresholds);
-    }
-    const bool has_rest = columns < image.width_px;
-    if (bright_blocks.empty() && !has_rest) continue;
-    for (int y = row; y < row + rows; ++y) {
-      const std::byte* row_start = first + y * image.stride_bytes;
-      for (const BrightBlock& block : bright_blocks) {
-        const std::uint32_t bits = vectors::BitsAbove(row_start + block.offset_bytes,
-                                                      static_cast<Pixel>(block.threshold_dn));
-        labeller.AddBits(y, block.column, bits, block.threshold_dn);
-      }
-      if (!has_rest) continue;
-      labeller.Scan<Pixel>(image, y, columns, image.width_px, thresholds[columns / kBlockWidth]);
-    }
-  }
-}
-
-// Among the whole blocks of one strip. Asks the vector unit once for kGroup blocks: an answer takes
-// it longer than folding a block.
-template <class Pixel>
-void CentreFinder::WorkSpace::FindBrightBlocks(const std::byte* first,
-                                               const ImageView& image,
-                                               std::span<const int> thresholds) {
-  using namespace vectors;
-  constexpr std::size_t kGroup = 8;
-  constexpr std::size_t kRegister = 16;
-  constexpr std::size_t kBlockBytes = std::size_t{kBlockWidth} * sizeof(Pixel);
-  const auto blocks = static_cast<std::size_t>(image.width_px / kBlockWidth);
-  const std::ptrdiff_t stride_bytes = image.stride_bytes;
-  std::array<std::byte, kGroup * kRegister> flags;
-  bright_blocks.clear();
-  for (std::size_t group = 0; group < blocks; group += kGroup) {
-    const std::size_t end = std::min(group + kGroup, blocks);
-    auto any = SpreadPixel(Pixel{0});
-    std::byte* flag = flags.data();
-    const auto compare = [&](const Pixels<Pixel>& best, std::size_t block) {
-      const auto above = Above(best, SpreadPixel(static_cast<Pixel>(thresholds[block])));
-      StorePixels(flag, above);
-      flag += kRegister;
-      any = Brighter(any, above);
-    };
-    std::size_t block = group;
-    for (; block + 2 <= end; block += 2) {
-      const auto best = BrightestOfBlocks<Pixel>(first, stride_bytes);
-      compare(best.left, block);
-      compare(best.right, block + 1);
-      first += 2 * kBlockBytes;
-    }
-    if (block < end) {
-      compare(BrightestOfBlock<Pixel>(first, stride_bytes), block);
-      first += kBlockBytes;
-    }
-    if (!AnyLane(any)) continue;
-    for (block = group; block < end; ++block) {
-      std::array<std::uint32_t, 4> words;
-      std::memcpy(words.data(), &flags[(block - group) * kRegister], sizeof words);
-      if ((words[0] | words[1] | words[2] | words[3]) == 0) continue;
-      bright_blocks.push_back(BlockAt<Pixel>(block, thresholds[block]));
-    }
-  }
-}
-
-// Of a strip of fewer rows, at the lower end of an image.
-template <class Pixel>
-void CentreFinder::WorkSpace::TakeAllBlocks(const ImageView& image,
-                                            std::span<const int> thresholds) {
-  const auto blocks = static_cast<std::size_t>(image.width_px / kBlockWidth);
-  bright_blocks.clear();
-  for (std::size_t block = 0; block < blocks; ++block) {
-    bright_blocks.push_back(BlockAt<Pixel>(block, thresholds[block]));
-  }
 }
 
 // Returns how many blobs there were that are more than a hot pixel.
