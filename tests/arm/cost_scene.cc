@@ -120,4 +120,17 @@ std::vector<CostFrame> GlareFrames(const Rig& rig, int count) {
   });
 }
 
+std::vector<CostFrame> CrowdFrames(const Rig& rig, int count) {
+  return Frames(rig, count, "frame_cost crowd", [](Random& random, RenderScene& scene) {
+    for (int i = 0; i < 300; ++i) {
+      RenderSpot spot;
+      spot.pixel_px = {random.Uniform(0.0, 1280.0), random.Uniform(0.0, 1024.0)};
+      spot.sigma_px = random.Uniform(1.0, 4.0);
+      spot.peak_dn = random.Uniform(25.0, 200.0);
+      scene.spots.push_back(spot);
+    }
+    return RenderMean(scene);
+  });
+}
+
 }  // namespace tbm::test

@@ -30,4 +30,7 @@ std::vector<CostFrame> DarkFrames(const Rig& rig, int count);
 // wet steel (0.3..0.6 px), 40 streaks, 20 round ones like LEDs (1..3 px).
 std::vector<CostFrame> GlareFrames(const Rig& rig, int count);
 
+// The dark frame among 300 round spots of 1..4 px: more than a frame ever has.
+std::vector<CostFrame> CrowdFrames(const Rig& rig, int count);
+
 }  // namespace tbm::test

@@ -1,20 +1,18 @@
 // What one 1280 x 1024 frame costs the camera box, step by step. Runs on the emulated Cortex-A8
-// under the counter of tests/arm/count_instructions.c: each step is a region that prctl marks.
-// Prints one line per step that names its region and says what it worked on; frame_cost_test.py
-// reads it.
-#include <array>
+// under the counter of count_instructions.c. Prints for each step a line that says what it worked
+// on; frame_cost_test.py reads it.
 #include <cstdio>
 #include <optional>
 #include <vector>
 
-#include <sys/prctl.h>
-
 #include "pose/frame/frame_solver.h"
 #include "tests/arm/cost_scene.h"
+#include "tests/arm/counted.h"
 
 namespace tbm::test {
 namespace {
 
+// Known to frame_cost_test.py.
 enum Region : unsigned long {
   kFindDark = 1,
   kFindGlare = 2,
@@ -23,22 +21,8 @@ enum Region : unsigned long {
   kBound = 5,
   kAfterFind = 6,
   kWhole = 7,
-  kFindWide = 8,
+  kFindCrowd = 8,
   kAssignCold = 9,
-  kReadOnce = 10,
-};
-
-constexpr unsigned long kMark = 0x54424D;
-
-class Counted {
- public:
-  explicit Counted(Region region) : region_(region) { prctl(kMark, region_, 1ul, 0ul, 0ul); }
-  ~Counted() { prctl(kMark, region_, 0ul, 0ul, 0ul); }
-  Counted(const Counted&) = delete;
-  Counted& operator=(const Counted&) = delete;
-
- private:
-  Region region_;
 };
 
 void CountFind(const std::vector<CostFrame>& frames, Region region, const char* what) {
@@ -46,6 +30,7 @@ void CountFind(const std::vector<CostFrame>& frames, Region region, const char* 
   (void)finder.Find(frames[0].image.view);  // takes its memory
   std::size_t centres = 0;
   int rejected = 0;
+  int dropped = 0;
   for (const CostFrame& frame : frames) {
     const FoundCentres* found = nullptr;
     {
@@ -56,17 +41,19 @@ void CountFind(const std::vector<CostFrame>& frames, Region region, const char* 
     if (found == nullptr) continue;
     centres += found->centres.size();
     rejected += found->levels.rejected_spots;
+    dropped += found->levels.dropped_spots;
   }
   const double count = static_cast<double>(frames.size());
-  std::printf("region %d %s: %.1f centres, %.1f rejected\n",
-              static_cast<int>(region),
+  std::printf("region %lu %s: %.1f centres, %.1f rejected, %.1f dropped\n",
+              static_cast<unsigned long>(region),
               what,
               static_cast<double>(centres) / count,
-              rejected / count);
+              rejected / count,
+              dropped / count);
 }
 
-// What FrameSolver does after Find, each step in a region of its own. As in a run: with the pose of
-// 0.2 s ago, and without it as `cold`.
+// What FrameSolver does after Find, each step in a region of its own: with the pose of 0.2 s
+// before, as in a run, and once more without for the assignment.
 void CountSteps(const Rig& rig, const std::vector<CostFrame>& frames) {
   CentreFinder finder({});
   int solved = 0;
@@ -98,14 +85,14 @@ void CountSteps(const Rig& rig, const std::vector<CostFrame>& frames) {
       checked = CheckPose(problem, (*assigned)->camera_from_target, prior);
     }
     if (!*checked) continue;
-    solved += (*checked)->pose.dof == 6;
+    solved += (*checked)->status == PoseStatus::kOk;
     const Counted counted(kBound);
     for (const PointResult& point : CheckPoints(problem, **checked, prior)) {
       bounded += point.bound_m.has_value();
     }
   }
-  std::printf("region %d assign, solve, bound: %d of %zu frames solved, %d bounds\n",
-              static_cast<int>(kAfterFind),
+  std::printf("region %lu assign, solve, bound: %d of %zu solved, %d bounds\n",
+              static_cast<unsigned long>(kAfterFind),
               solved,
               frames.size(),
               bounded);
@@ -113,27 +100,25 @@ void CountSteps(const Rig& rig, const std::vector<CostFrame>& frames) {
 
 void CountWhole(const Rig& rig, const std::vector<CostFrame>& frames) {
   FrameSolver solver(rig);
-  int solved = 0;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const CostFrame& frame = frames[i];
-    const Timestamp sensed_at = frame.sensed_at;
-    for (const Duration offset : {Duration(-std::chrono::milliseconds(50)), Duration::zero()}) {
-      solver.AddTilt({sensed_at + offset, TiltSensor::kTarget, frame.target_tilt.inclination});
-      solver.AddTilt({sensed_at + offset, TiltSensor::kCamera, frame.camera_tilt.inclination});
+  std::size_t solved = 0;
+  for (const CostFrame& frame : frames) {
+    for (const auto before : {std::chrono::milliseconds(50), std::chrono::milliseconds(0)}) {
+      const Timestamp at = frame.sensed_at - before;
+      solver.AddTilt({at, TiltSensor::kTarget, frame.target_tilt.inclination});
+      solver.AddTilt({at, TiltSensor::kCamera, frame.camera_tilt.inclination});
     }
-    if (i == 0) {
-      (void)solver.Solve({sensed_at, frame.image.view});  // takes its memory
+    const FrameInput input{frame.sensed_at, frame.image.view};
+    if (&frame == &frames.front()) {
+      (void)solver.Solve(input);  // takes its memory
       continue;
     }
-    const FrameResult* result = nullptr;
-    {
-      const Counted counted(kWhole);
-      result = &solver.Solve({sensed_at, frame.image.view});
-    }
-    solved += result->status == PoseStatus::kOk;
+    const Counted counted(kWhole);
+    solved += solver.Solve(input).status == PoseStatus::kOk;
   }
-  std::printf(
-      "region %d whole frame: %d of %zu ok\n", static_cast<int>(kWhole), solved, frames.size() - 1);
+  std::printf("region %lu whole frame: %zu of %zu solved\n",
+              static_cast<unsigned long>(kWhole),
+              solved,
+              frames.size() - 1);
 }
 
 int Main() {
@@ -142,8 +127,8 @@ int Main() {
   CountFind(dark, kFindDark, "find, dark");
   CountSteps(rig, dark);
   CountWhole(rig, dark);
-  const std::vector<CostFrame> glare = GlareFrames(rig, 2);
-  CountFind(glare, kFindGlare, "find, glare");
+  CountFind(GlareFrames(rig, 2), kFindGlare, "find, glare and 300 false spots");
+  CountFind(CrowdFrames(rig, 1), kFindCrowd, "find, 300 spots like LEDs");
   return 0;
 }
 
