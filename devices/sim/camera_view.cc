@@ -69,7 +69,8 @@ void CameraView::DrawBackground(double light, std::uint64_t key, std::uint8_t* p
     const double signal_dn = std::max(0.0, light * options_.background_dn);
     const double sigma_dn = std::sqrt(options_.read_noise_dn * options_.read_noise_dn +
                                       options_.gain_dn_per_electron * signal_dn);
-    const int sigma_256 = static_cast<int>(std::lround(256.0 * sigma_dn));
+    // Beyond a few times full scale noise is noise, and the sums below stay in an int.
+    const int sigma_256 = static_cast<int>(std::lround(256.0 * std::min(sigma_dn, 1000.0)));
     const int left_65536 = static_cast<int>(
         65536.0 * std::clamp(options_.black_dn + light * left_dn + 0.5, -1000.0, 4000.0));
     const int slope_65536 = static_cast<int>(

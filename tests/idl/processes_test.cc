@@ -100,7 +100,7 @@ TEST(FrozenReader, BlocksNeitherTheWriterNorAnotherReader) {
   frozen.Signal(SIGCONT);
   pose.sample_number = 3000;
   publisher.Write(pose);
-  EXPECT_TRUE(Eventually([&] { return frozen.HasLine("pose 3000"); }, 10s));
+  EXPECT_TRUE(Eventually([&] { return frozen.HasLine("pose 3000"); }, 30s));
 }
 
 // The writer's type has one field more in the middle: without care its bytes read as other numbers.

@@ -3,7 +3,9 @@
 // Debian's libraries are not instrumented: of their own locks, queues and atomics the sanitizer
 // sees only the calls into libc. No line here hides a data race of our own code, also not where a
 // library's thread calls it back; the last one hides a wrong order of our locks inside such a call.
-#if defined(__SANITIZE_THREAD__)
+#include "tests/support/sanitized.h"
+
+#if defined(TBM_TSAN)
 
 extern "C" const char* __tsan_default_suppressions();
 extern "C" const char* __tsan_default_suppressions() {
@@ -25,13 +27,7 @@ extern "C" const char* __tsan_default_suppressions() {
 
 #endif
 
-#if defined(__has_feature)  // clang's way to say what GCC says by __SANITIZE_ADDRESS__
-#if __has_feature(address_sanitizer)
-#define TBM_UNDER_ASAN
-#endif
-#endif
-
-#if defined(__SANITIZE_ADDRESS__) || defined(TBM_UNDER_ASAN)
+#if defined(TBM_ASAN)
 
 extern "C" const char* __asan_default_options();
 extern "C" const char* __asan_default_options() {

@@ -242,6 +242,8 @@ TEST_F(WholeMachine, TheSelfTestNamesTheLedThatIsOffAndThenTheMissingMachine) {
     const auto simulator = StartSimulator({"--hide-led", "P3"});
     Process self_test(command);
     EXPECT_EQ(self_test.Wait(), 3);
+    EXPECT_TRUE(
+        Eventually([&] { return self_test.Output().find(". The box") != std::string::npos; }));
     EXPECT_THAT(self_test.Output(), HasSubstr("BAD    LED P3               not seen"));
     EXPECT_THAT(self_test.Output(), HasSubstr("good   LED P4"));
     EXPECT_THAT(self_test.Output(), HasSubstr("good   inclinometer target"));
@@ -250,6 +252,8 @@ TEST_F(WholeMachine, TheSelfTestNamesTheLedThatIsOffAndThenTheMissingMachine) {
   }
   Process self_test(command);
   EXPECT_EQ(self_test.Wait(), 3);
+  EXPECT_TRUE(
+      Eventually([&] { return self_test.Output().find(". The box") != std::string::npos; }));
   EXPECT_THAT(self_test.Output(), HasSubstr("BAD    camera               unreachable"));
   EXPECT_THAT(self_test.Output(), HasSubstr("BAD    inclinometer camera  port_missing"));
 }

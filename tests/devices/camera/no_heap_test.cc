@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/devices/camera/gige_bench.h"
+#include "tests/support/sanitized.h"
 
 namespace {
 
@@ -15,7 +16,7 @@ void Count() {
 
 }  // namespace
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(TBM_SANITIZED)
 #define TBM_OWN_MALLOC 0
 #else
 #define TBM_OWN_MALLOC 1

@@ -12,8 +12,9 @@
 #include "pose/solve/solve_pose.h"
 #include "pose/solve/tails.h"
 #include "tests/pose/solve/faults.h"
+#include "tests/support/sanitized.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(TBM_SANITIZED)
 #define TBM_COUNTS_HEAP 0
 #else
 #define TBM_COUNTS_HEAP 1

@@ -5,9 +5,10 @@
 #include "tests/pose/solve/as_built.h"
 #include "tests/pose/solve/placements.h"
 #include "tests/support/no_alloc.h"
+#include "tests/support/sanitized.h"
 
 // Eigen asks malloc, not operator new. Sanitizers bring a malloc of their own.
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if !defined(TBM_SANITIZED)
 extern "C" void* __libc_malloc(std::size_t size);
 extern "C" void* malloc(std::size_t size) {
   ++tbm::test::heap_requests;
@@ -19,7 +20,7 @@ namespace tbm::test {
 namespace {
 
 TEST(NoHeap, TheCounterSeesEigen) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(TBM_SANITIZED)
   GTEST_SKIP() << "malloc belongs to the sanitizer";
 #endif
   const HeapCounter counter;
