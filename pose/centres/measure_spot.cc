@@ -133,10 +133,6 @@ SpotVerdict SpotMeter::MeasureOnce(const ImageView& image,
   fit->background_variance_dn2 = plane.variance_dn2;
   fit->background_structure_dn = plane.structure_dn;
   const double gain = noise.gain_dn_per_electron;
-  if (fit->clipped_pixels > 0) {
-    if (!Improve(gain, care, fit)) return SpotVerdict::kNotASpot;
-    MaskNearClipping(*fit, gain, image.max_value);
-  }
   if (!Improve(gain, care, fit)) {
     return SpotVerdict::kNotASpot;
   }
@@ -332,22 +328,6 @@ bool SpotMeter::Improve(double gain, Care care, SpotFit* fit) {
   }
   FillTables(*fit);
   return true;
-}
-
-// A pixel that could as well have been clipped passes only when noise pulled it down: leaving it in
-// would bias. So the model decides who is left out, not the datum.
-void SpotMeter::MaskNearClipping(const SpotFit& fit, double gain, double full_dn) {
-  const PixelBox& inner = patch_.inner();
-  const double ceiling_dn = full_dn - patch_.background().level_dn;
-  const double noise_dn = std::sqrt(fit.background_variance_dn2 + gain * ceiling_dn);
-  const auto limit = static_cast<float>(ceiling_dn - 2.0 * noise_dn);
-  const auto amplitude = static_cast<float>(fit.amplitude_dn);
-  for (int row = inner.top; row <= inner.bottom; ++row) {
-    const float height = amplitude * At(rows_.data(), static_cast<std::size_t>(row - inner.top)).g;
-    for (int i = 0; i < inner.width(); ++i) {
-      if (height * At(columns_.data(), static_cast<std::size_t>(i)).g > limit) patch_.Mask(row, i);
-    }
-  }
 }
 
 // Any pixel of the row far above the model.

@@ -87,7 +87,6 @@ class SpotMeter {
   template <Weighing kWeighing>
   Scores Score(const SpotFit& fit, double gain, int every);
   bool Improve(double gain, Care care, SpotFit* fit);
-  void MaskNearClipping(const SpotFit& fit, double gain, double full_dn);
   bool IsHot(int row, float amplitude) const;
   bool MaskSingleBrightPixels(const SpotFit& fit, double gain);
   SpotVerdict Judge(const ImageView& image, const SpotGuess& guess, const SpotFit& fit) const;

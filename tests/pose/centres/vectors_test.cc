@@ -27,7 +27,7 @@ float AnyFloat(Random& random) {
     case 2:
       return std::ldexp(1.0f, random.Index(80) - 40);
     case 3:
-      return std::nextafter(static_cast<float>(random.Index(9)), 100.0f);
+      return std::nextafter(static_cast<float>(1 + random.Index(9)), 100.0f);
     case 4:
       return -static_cast<float>(std::exp(random.Uniform(-30.0, 30.0)));
     default:
