@@ -41,7 +41,8 @@ EFFECTS = {"condition_variable", "filesystem", "fstream", "future", "iostream", 
 # One file alone may know a library that its folder may not.
 ONLY_IN = {"ceres": {"pose/solve/penalty_pose.cc"},
            "systemd": {"pose/app/service_manager.cc"},
-           **{header: {"pose/centres/vectors.h"} for header in VECTOR_UNIT},
+           "emmintrin.h": {"pose/centres/vectors_sse2.h"},
+           "arm_neon.h": {"pose/centres/vectors_neon.h"},
            "arv.h": {"devices/camera", "devices/app"},
            "yaml-cpp": {"pose/rig", "pose/app", "guidance/config", "devices/app"}}
 

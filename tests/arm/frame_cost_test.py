@@ -41,9 +41,9 @@ MOST_VFP64_OF_FIND = 1280 * 1024 // 64
 SOLVED = re.compile(r"(\d+) of (\d+) solved")
 
 
-def count(emulator, plugin, program):
+def count(emulator, plugin, program, *arguments):
     """Counts by region, and what the program says of each region."""
-    command = [*shlex.split(emulator), "-plugin", str(plugin), str(program)]
+    command = [*shlex.split(emulator), "-plugin", str(plugin), str(program), *arguments]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
         sys.exit(f"{shlex.join(command)}: exit code {result.returncode}\n{result.stdout}{result.stderr}")
