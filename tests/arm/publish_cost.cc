@@ -3,7 +3,9 @@
 // tests/arm/count_instructions.c; publish_cost_test.py reads the line it prints.
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <thread>
+#include <vector>
 
 #include <sys/prctl.h>
 
@@ -23,7 +25,8 @@ constexpr int kFrames = 40;
 
 int Main(int domain_id) {
   const Rig rig = CostRig();
-  const CostFrame frame = DarkFrames(rig, 1)[0];
+  const std::vector<CostFrame> frames = DarkFrames(rig, 2);
+  const CostFrame& frame = frames[1];  // the first one is of 1970
   FrameSolver solver(rig);
   solver.AddTilt({frame.sensed_at, TiltSensor::kTarget, frame.target_tilt.inclination});
   solver.AddTilt({frame.sensed_at, TiltSensor::kCamera, frame.camera_tilt.inclination});
@@ -49,9 +52,22 @@ int Main(int domain_id) {
     prctl(kMark, kPublish, 1ul, 0ul, 0ul);
     dds::RelativePose pose;
     FillRelativePose("TBM-1", "hash", rig, result, &pose);
-    poses.Write(pose);
-    features.Write(FeaturesOf("TBM-1", result, 1, 5000.0, {}));
+    pose.sample_number = static_cast<std::uint64_t>(i + 1);
+    pose.published_at = frame.sensed_at;
+    dds::FrameFeatures seen = FeaturesOf("TBM-1", result, 1, 5000.0, {});
+    seen.published_at = frame.sensed_at;
+    const auto pose_outcome = poses.Write(pose);
+    const auto seen_outcome = features.Write(seen);
     prctl(kMark, kPublish, 0ul, 0ul, 0ul);
+    if (pose_outcome != dds::WriteOutcome::kWritten ||
+        seen_outcome != dds::WriteOutcome::kWritten) {
+      std::printf("not written: pose %d for %d (status %d), features %d\n",
+                  static_cast<int>(pose_outcome),
+                  static_cast<int>(poses.counters().refused_because),
+                  static_cast<int>(result.status),
+                  static_cast<int>(seen_outcome));
+      return 1;
+    }
   }
   std::printf("region %lu publish: %zu spots\n", kPublish, result.centres.size());
   return 0;
