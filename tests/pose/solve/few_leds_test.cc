@@ -1,4 +1,5 @@
 #include <cmath>
+#include <cstdio>
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
@@ -228,6 +229,38 @@ TEST(ThreeLeds, VisionAloneIsRightOrSaysAmbiguous) {
     }
   }
   EXPECT_GT(right + ambiguous, 980);
+}
+
+// A square target seen from afar has a second pose, tilted the other way, that fits nearly as well.
+TEST(FourLeds, ASecondPoseThatFitsNearlyAsWellMakesVisionAmbiguous) {
+  Random random("few leds second pose");
+  Rig rig = PublishedRig();
+  for (Led& led : rig.leds) led.p_led_in_target.z() = 0.0;  // all in one plane
+  int solved = 0;
+  int wrong = 0;
+  int ambiguous = 0;
+  for (int i = 0; i < 600; ++i) {
+    const Truth truth = DrawTruth(random, {8.0, 12.0, 0.2, 0.3, 0.05});
+    PoseProblem problem = NoisyProblem(rig, truth, 0.3, 0.0, random);
+    problem.target_tilt.reset();
+    problem.camera_tilt.reset();
+    SolveOptions options;
+    options.max_sigma_rotation_rad = 0.2;
+    options.max_sigma_translation_m = 1.0;
+    const PoseResult result = SolveVision(problem, std::nullopt, options);
+    if (!result) {
+      ambiguous += result.error() == PoseFailure::kAmbiguous;
+      continue;
+    }
+    ++solved;
+    const PoseError error = ErrorBetween(result->camera_from_target, truth.camera_from_target);
+    const double errors2 = error.dot(result->covariance.ldlt().solve(error));
+    wrong += errors2 > 60.0;  // six degrees of freedom: one of 10^10 honest ones
+  }
+  std::printf("%d solved, %d of them wrong, %d ambiguous\n", solved, wrong, ambiguous);
+  EXPECT_GT(solved, 100);
+  EXPECT_GT(ambiguous, 20);
+  EXPECT_LE(wrong, 1);
 }
 
 TEST(ThreeLeds, WithTiltsAreChecked) {

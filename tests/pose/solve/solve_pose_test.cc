@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
@@ -316,6 +317,32 @@ TEST(SolveFused, NeverEndsUpsideDown) {
       EXPECT_LT(TurnErrorDeg(result->camera_from_target, truth), 1.0);
     }
   }
+}
+
+// Two LEDs fit many an upside-down pose exactly, and so do the tangents of the tilts.
+TEST(SolveFused, NeverEndsUpsideDownWithTwoLedsEither) {
+  Random random("solve pose upside down two");
+  const Rig rig = FieldRig();
+  int solved = 0;
+  for (int i = 0; i < 500; ++i) {
+    const Truth truth = DrawTruth(random, {2.5, 6.0, 0.3, 0.1, 0.1});
+    PoseProblem problem = ExactProblem(rig, truth);
+    problem.leds.erase(static_cast<std::size_t>(i % 4));
+    problem.leds.erase(static_cast<std::size_t>(i % 3));
+    problem.leds.erase(0);
+    const Eigen::Vector3d across =
+        Eigen::AngleAxisd(random.Uniform(0.0, 6.28), truth.up_in_camera) *
+        truth.up_in_camera.unitOrthogonal();
+    Rigid3 start = truth.camera_from_target;
+    start.rotation = Eigen::AngleAxisd(std::numbers::pi, across) * start.rotation;
+    const PoseResult result = SolveFused(problem, start);
+    if (!result) continue;
+    ++solved;
+    const Eigen::Vector3d up_in_target =
+        truth.camera_from_target.rotation.conjugate() * truth.up_in_camera;
+    EXPECT_GT(truth.up_in_camera.dot(result->camera_from_target.rotation * up_in_target), 0.99);
+  }
+  EXPECT_LT(solved, 500);
 }
 
 TEST(SolveVision, RefusesLedsOnOneLine) {
