@@ -314,6 +314,32 @@ TEST(AssignLeds, APoorlyKnownPrincipalPointWidensTheGates) {
   EXPECT_GE(right, 198);
 }
 
+// The same for inclinometers bolted on by eye.
+TEST(AssignLeds, PoorlyKnownMountingsWidenTheGates) {
+  Random random("assign_mountings");
+  Rig declared = FieldRig();
+  declared.target_tilt.mounting_sigma_rad = declared.camera_tilt.mounting_sigma_rad =
+      DegToRad(0.15);
+  int right = 0;
+  for (int i = 0; i < 200; ++i) {
+    const Rig as_built = AsBuilt(declared, random);
+    const Draw draw = DrawFrame(as_built, Visible(5, 5, FalseSpots::kUniform, 2), random);
+    right += AnswerTo(draw, Assign(declared, draw)) == Answer::kRight;
+  }
+  EXPECT_GE(right, 198);
+}
+
+// Centres good to 1.5 px leave wide gates, and among twenty spots beside the target one may well
+// stand where a dark LED would be: it is left out rather than believed.
+TEST(AssignLeds, ASpotThatMayBeChanceIsLeftOut) {
+  DrawOptions options = WithPrior(Visible(4, 4, FalseSpots::kClustered, 20));
+  options.centre_sigma_px = 1.5;
+  const Tally tally = AssignDraws(FieldRig(), FieldRig(), options, 600, "assign_left_out");
+  Print("left out", tally);
+  EXPECT_GE(tally.RightShare(), 0.85);
+  EXPECT_LE(tally.WrongShare(), 0.01);
+}
+
 // Old spots that still look like the target where it was, beside the target where it is now.
 TEST(AssignLeds, FiveLedsOutweighAPriorThatThreeOldReflectionsSupport) {
   Random random("assign_outweighs");
