@@ -57,6 +57,17 @@ int HalfWidth(double sigmas, double spread_px) {
   return static_cast<int>(std::ceil(sigmas * spread_px)) + 1;
 }
 
+// A window in which nearly everything is clipped leaves sums without a term: what they were divided
+// by is zero, and the sigma of such a centre is no number.
+bool IsSound(const SpotFit& fit) {
+  const double numbers = fit.moment_uu_px2 + fit.moment_uv_px2 + fit.moment_vv_px2 +
+                         fit.by_dark_u_px2 + fit.by_dark_v_px2 + fit.by_gain_u_px2 +
+                         fit.by_gain_v_px2 + fit.gain_seen + fit.gain_seen_sigma;
+  return std::isfinite(numbers) && fit.amplitude_dn > 0.0 &&
+         std::min(fit.by_gain_u_px2, fit.by_gain_v_px2) > 0.0 &&
+         std::min(fit.by_dark_u_px2, fit.by_dark_v_px2) >= 0.0;
+}
+
 }  // namespace
 
 double SpotFit::Elongation() const {
@@ -147,7 +158,7 @@ SpotVerdict SpotMeter::MeasureOnce(const ImageView& image,
   ConcludeVariance(fit);
   fit->background_dn = plane.level_dn + plane.by_u * (fit->u_px - guess.u_px) +
                        plane.by_v * (fit->v_px - guess.v_px);
-  return SpotVerdict::kMeasured;
+  return IsSound(*fit) ? SpotVerdict::kMeasured : SpotVerdict::kNotASpot;
 }
 
 SpotVerdict SpotMeter::Judge(const ImageView& image,

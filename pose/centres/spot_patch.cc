@@ -14,6 +14,9 @@ namespace {
 
 using namespace vectors;
 
+// Determinant of the background's normal equations over the product of their diagonal: one for a
+// frame all around the spot, 4e-4 where one corner of it is left, zero for pixels on one line.
+constexpr double kFlattest = 1e-5;
 constexpr int kWidened = 16;  // pixels that are made floats at a time
 
 constexpr int RoundUp(int count, int to) { return (count + to - 1) / to * to; }
@@ -350,6 +353,9 @@ bool SpotPatch::RefinePlane(double limit_dn, int every) {
                           total(sums.nxx) + 1e-6,
                           total(sums.nxy),
                           total(sums.nyy) + 1e-6};
+  // What is left stands nearly on one line: it says nothing of the slope across.
+  const double determinant = normal.Determinant();
+  if (!(determinant > kFlattest * normal.m00 * normal.m11 * normal.m22)) return false;
   const double r = total(sums.r);
   const double rx = total(sums.rx);
   const double ry = total(sums.ry);
@@ -374,8 +380,7 @@ bool SpotPatch::RefinePlane(double limit_dn, int every) {
   const double off2 =
       std::max(total(sums.all) - squared, 0.0) / off * std::max(off / pixels - 0.015, 0.0);
   plane_.structure_dn = std::sqrt(off2 + (flat ? 0.0 : by_residuals - by_differences));
-  const double inverse = 1.0 / normal.Determinant();
-  plane_.slope_variance = by_residuals * inverse * std::max(normal.c11(), normal.c22());
+  plane_.slope_variance = by_residuals / determinant * std::max(normal.c11(), normal.c22());
   return true;
 }
 

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <iterator>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -410,6 +413,32 @@ TEST(FindCentres, MoreSpotsThanRoomDropsTheFaintest) {
 }
 
 // Noise in every pixel makes more runs than there is room for.
+// Seen 2026-11: of the background only pixels on one line were left; the slope's variance came out
+// negative and a centre with a sigma that is no number was reported.
+TEST(FindCentres, BackgroundOnOneLineGivesNoSigmaThatIsNoNumber) {
+  std::ifstream file(TBM_SOURCE_DIR "/tests/fuzz/seeds/find_centres_fuzz/nearly_all_clipped",
+                     std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(file)), {});
+  ASSERT_EQ(bytes.size(), 699u);
+  constexpr int kWidth = 40;
+  constexpr int kHeight = 30;
+  std::vector<std::uint8_t> pixels;
+  for (std::size_t i = 0; i < kWidth * kHeight; ++i) {
+    pixels.push_back(static_cast<std::uint8_t>(bytes[5 + i % (bytes.size() - 5)]));
+  }
+  ImageView view;
+  view.pixels = pixels.data();
+  view.stride_bytes = kWidth;
+  view.width_px = kWidth;
+  view.height_px = kHeight;
+  view.bytes_per_pixel = 1;
+  view.max_value = 255;
+  CentreFinder finder({});
+  const auto found = finder.Find(view);
+  if (!found) return;
+  for (const Centre& centre : found.value()->centres) EXPECT_GT(centre.sigma_px, 0.0);
+}
+
 TEST(FindCentres, PureNoiseEndsAndFindsNothing) {
   Random random("FindCentres.Noise");
   RenderedImage image;
