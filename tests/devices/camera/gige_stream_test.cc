@@ -69,10 +69,13 @@ TEST(GigeCamera, LossIsCountedFromFrameIds) {
   CameraConfig config = GigeConfig(50.0, kProxyAddress);
   config.silent_after_ms = 2000;
   const auto camera = MakeCamera(config, kClock);
-  ASSERT_TRUE(NextFrame(*camera));
-  const auto before = NextFrame(*camera);
-  ASSERT_TRUE(before);
-  const auto first = SequenceOf(*before);
+  // The first image after the start is often damaged, on a busy machine the next one too.
+  std::optional<std::uint32_t> first;
+  for (int i = 0; i < 5 && !first; ++i) {
+    const auto before = NextFrame(*camera);
+    ASSERT_TRUE(before);
+    if (i > 0) first = SequenceOf(*before);
+  }
   const std::uint64_t lost_before = camera->Health().lost;
   const std::uint64_t frames_before = camera->Health().frames;
   for (int hole = 0; hole < 3; ++hole) {
@@ -82,7 +85,8 @@ TEST(GigeCamera, LossIsCountedFromFrameIds) {
     FramesFor(*camera, std::chrono::milliseconds(300));
   }
   const auto after = NextFrame(*camera);
-  ASSERT_TRUE(after && first);
+  ASSERT_TRUE(first);
+  ASSERT_TRUE(after);
   const auto last = SequenceOf(*after);
   ASSERT_TRUE(last);
   const CameraHealth health = camera->Health();
