@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace tbm {
@@ -27,8 +28,13 @@ class PtyOutbox {
   std::optional<SteadyTime> NextDue() const;
   void Clear() { queue_.clear(); }
 
+  // The instrument closes the connection. Means nothing on a wire that is no connection.
+  void HangUp() { hangs_up_ = true; }
+  bool TakeHangUp() { return std::exchange(hangs_up_, false); }
+
  private:
   std::multimap<SteadyTime, std::vector<std::uint8_t>> queue_;
+  bool hangs_up_ = false;
 };
 
 // The instrument's end of a wire. Called from the server's thread only.

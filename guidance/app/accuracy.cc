@@ -9,7 +9,7 @@
 #include <Eigen/SVD>
 #include <fmt/format.h>
 
-#include "guidance/app/gsi.h"
+#include "devices/gsi/gsi.h"
 
 namespace tbm {
 namespace {

@@ -1,4 +1,4 @@
-#include "guidance/app/gsi.h"
+#include "devices/gsi/gsi.h"
 
 #include <numbers>
 #include <string>
