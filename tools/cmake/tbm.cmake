@@ -19,6 +19,31 @@ if(TBM_SANITIZE)
   target_link_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE})
 endif()
 
+# A test spends its time in what it tests; its own code compiles faster with less optimisation
+# (at which GCC 12 sees copies beyond the end of a std::string where there are none).
+set(tbm_test_optimisation -O1
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>)
+
+# What nearly every file includes, compiled once for each tree: a third less time for a test.
+# Product code gets it in the instrumented trees only; in the others an include that it lacks is noticed.
+set(tbm_common_headers
+  <algorithm> <array> <atomic> <chrono> <cmath> <cstdint> <filesystem> <functional> <map> <memory> <mutex>
+  <optional> <span> <string> <string_view> <thread> <vector> <Eigen/Core> <Eigen/Geometry> <Eigen/LU>)
+function(tbm_precompile name)
+  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/${name}.cc CONTENT "// holds ${name}\n")
+  add_library(${name} OBJECT ${CMAKE_BINARY_DIR}/${name}.cc)
+  target_link_libraries(${name} PRIVATE tbm_options Eigen3::Eigen)
+  target_precompile_headers(${name} PRIVATE ${tbm_common_headers} ${ARGN})
+endfunction()
+# Where the compiler refuses to take it for another set of flags, it says so and the build fails.
+function(tbm_use_precompiled target name)
+  if(NOT TARGET ${name})
+    return()
+  endif()
+  target_precompile_headers(${target} REUSE_FROM ${name})
+  target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)
+endfunction()
+
 # Tests that also run under the sanitizers carry the label asan or tsan and are built by one target.
 add_custom_target(sanitized_tests)
 
@@ -27,6 +52,9 @@ function(tbm_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
   add_library(tbm_${name} STATIC ${ARG_SOURCES})
   target_link_libraries(tbm_${name} PUBLIC tbm_options ${ARG_DEPS})
+  if(TBM_SANITIZE)
+    tbm_use_precompiled(tbm_${name} tbm_precompiled)
+  endif()
 endfunction()
 
 # tbm_program(camera_box SOURCES main.cc DEPS ...)   makes the executable of that name in <build>/bin
@@ -46,6 +74,8 @@ function(tbm_test path)
   add_executable(${target} ${PROJECT_SOURCE_DIR}/tests/${path}_test.cc ${ARG_SOURCES})
   target_link_libraries(${target} PRIVATE tbm_options ${ARG_DEPS} GTest::gmock GTest::gtest_main)
   target_compile_definitions(${target} PRIVATE TBM_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  target_compile_options(${target} PRIVATE ${tbm_test_optimisation})
+  tbm_use_precompiled(${target} tbm_precompiled_for_tests)
   add_test(NAME ${path} COMMAND ${target})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
@@ -74,6 +104,7 @@ function(tbm_fuzz name)
   cmake_parse_arguments(ARG "" "" "DEPS" ${ARGN})
   add_executable(${name}_fuzz ${PROJECT_SOURCE_DIR}/tests/fuzz/${name}_fuzz.cc)
   target_link_libraries(${name}_fuzz PRIVATE tbm_options ${ARG_DEPS})
+  tbm_use_precompiled(${name}_fuzz tbm_precompiled)
   target_link_options(${name}_fuzz PRIVATE -fsanitize=fuzzer,address,undefined)
   set_target_properties(${name}_fuzz PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
   add_dependencies(fuzz_targets ${name}_fuzz)
