@@ -33,15 +33,16 @@ ALLOWED = {
     "devices/replay": {"Eigen", *POSE_ALL, "png.h", "tiffio.h", "fmt", *POSIX},
     "devices/sim": {"Eigen", *POSE, "pose/centres/image_view.h"},
     "devices/app": {"Eigen", *POSE_ALL, "devices", "fmt", "CLI", "yaml-cpp", *POSIX, "arv.h"},
-    "guidance/app": {"Eigen", *POSE_ALL, "devices", "idl/cpp", "fmt", "CLI", "nlohmann", *POSIX},
+    "guidance/app": {"Eigen", *POSE_ALL, "devices", "guidance/axis", "guidance/config", "idl/cpp", "fmt", "CLI", "nlohmann", *POSIX},
     "guidance/station": {"Eigen", "pose/base", "pose/geometry", "pose/solve/tails.h"},
     "guidance/shield": {"Eigen", "pose/base", "pose/geometry", "pose/solve/tails.h", "pose/solve/dense_cholesky.h",
                         "guidance/axis"},
-    "guidance/config": {"pose/base", "yaml-cpp", "fmt"},
+    "guidance/axis": {"Eigen", "pose/base", "pose/geometry"},
+    "guidance/config": {"Eigen", "pose/base", "guidance/axis", "devices/replay/csv.h", "yaml-cpp", "fmt", "pugixml.hpp", "openssl"},
     "idl/cpp": {"Eigen", *POSE_ALL, "fastdds", "fastrtps", "fastcdr", "tbm_idl", "fmt", *POSIX},
 }
 # Folders that compute and do nothing else, and the standard headers that would betray them.
-PURE = {"pose/base", "pose/geometry", "pose/centres", "pose/solve", "pose/frame", "guidance/station", "guidance/shield"}
+PURE = {"pose/base", "pose/geometry", "pose/centres", "pose/solve", "pose/frame", "guidance/axis", "guidance/station", "guidance/shield"}
 EFFECTS = {"condition_variable", "filesystem", "fstream", "future", "iostream", "mutex", "thread", "ctime", "random"}
 # One file alone may know a library that its folder may not.
 ONLY_IN = {"ceres": {"pose/solve/penalty_pose.cc"},
@@ -50,6 +51,7 @@ ONLY_IN = {"ceres": {"pose/solve/penalty_pose.cc"},
            "arm_neon.h": {"pose/centres/vectors_neon.h"},
            "arv.h": {"devices/camera", "devices/app"},
            "boost": {"devices/total_station/asio_link.cc"},
+           "pugixml.hpp": {"guidance/config"},
            "yaml-cpp": {"pose/rig", "pose/app", "guidance/config", "devices/app"}}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
