@@ -1,9 +1,5 @@
 #include "devices/app/machine_options.h"
 
-#include <cerrno>
-#include <cmath>
-#include <csignal>
-#include <ctime>
 #include <utility>
 
 #include "devices/app/fault_options.h"
@@ -12,14 +8,6 @@
 
 namespace tbm {
 namespace {
-
-sigset_t EndSignals() {
-  sigset_t set;
-  sigemptyset(&set);
-  sigaddset(&set, SIGINT);
-  sigaddset(&set, SIGTERM);
-  return set;
-}
 
 // Parses every text; what fails adds its line to `problems`.
 template <class T, class Parse>
@@ -104,25 +92,6 @@ Result<std::shared_ptr<const sim::World>, std::string> BuildWorld(const MachineO
   if (!problems.empty()) return Failure{problems};
   return std::shared_ptr<const sim::World>(std::make_shared<sim::World>(
       rig, motion, std::move(faults), SystemClock().Now(), options.speed));
-}
-
-void HoldSignals() {
-  const sigset_t set = EndSignals();
-  pthread_sigmask(SIG_BLOCK, &set, nullptr);
-}
-
-void WaitForEnd(double run_for_s) {
-  const sigset_t set = EndSignals();
-  if (run_for_s <= 0.0) {
-    int signal = 0;
-    sigwait(&set, &signal);
-    return;
-  }
-  const double whole_s = std::floor(run_for_s);
-  const timespec limit{static_cast<std::time_t>(whole_s),
-                       static_cast<long>((run_for_s - whole_s) * 1e9)};
-  while (sigtimedwait(&set, nullptr, &limit) < 0 && errno == EINTR) {
-  }
 }
 
 }  // namespace tbm

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "devices/app/end_signals.h"
 #include "devices/app/gige_simulator.h"
 #include "devices/sim/camera_view.h"
 #include "devices/sim/world.h"
@@ -36,11 +37,5 @@ void AddMachineOptions(CLI::App& app, MachineOptions& options);
 // The world that the options describe, beginning now. All faults of the command line and of the rig
 // file at once, one a line.
 Result<std::shared_ptr<const sim::World>, std::string> BuildWorld(const MachineOptions& options);
-
-// SIGINT and SIGTERM wait for WaitForEnd from here on; call it before any thread is made.
-void HoldSignals();
-
-// Returns when a signal has come or `run_for_s` (if not 0) is over.
-void WaitForEnd(double run_for_s);
 
 }  // namespace tbm

@@ -47,11 +47,21 @@ Sight SightTo(const Eigen::Vector3d& from,
 }  // namespace
 
 Eigen::Vector3d EmulatedInstrument::PillarAt(Timestamp at) const {
-  return pillar.p_in_site + SecondsBetween(pillar.since, at) * pillar.drift_m_per_s;
+  Eigen::Vector3d p_in_site =
+      pillar.p_in_site + SecondsBetween(pillar.since, at) * pillar.drift_m_per_s;
+  for (const EmulatedKnock& knock : pillar.knocks) {
+    if (knock.at <= at) p_in_site += knock.shift_m;
+  }
+  return p_in_site;
 }
 
 double EmulatedInstrument::CircleZeroAt(Timestamp at) const {
-  return pillar.circle_zero_bearing_rad + SecondsBetween(pillar.since, at) * pillar.drift_rad_per_s;
+  double bearing_rad =
+      pillar.circle_zero_bearing_rad + SecondsBetween(pillar.since, at) * pillar.drift_rad_per_s;
+  for (const EmulatedKnock& knock : pillar.knocks) {
+    if (knock.at <= at) bearing_rad += knock.turn_rad;
+  }
+  return bearing_rad;
 }
 
 CircleReading EmulatedInstrument::IdealReading(const Eigen::Vector3d& p_in_site,

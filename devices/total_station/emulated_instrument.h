@@ -19,6 +19,13 @@ struct EmulatedPrism {
   double constant_m = 0.0;  // what has to be added to a raw distance to it
 };
 
+// A knock against the bracket.
+struct EmulatedKnock {
+  Timestamp at;
+  Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();
+  double turn_rad = 0.0;  // of the circle's zero, clockwise
+};
+
 // Where the instrument stands and how: everything that moves when its bracket does.
 struct EmulatedPillar {
   Eigen::Vector3d p_in_site = Eigen::Vector3d::Zero();  // where its axes cross
@@ -29,6 +36,7 @@ struct EmulatedPillar {
   Timestamp since;
   Eigen::Vector3d drift_m_per_s = Eigen::Vector3d::Zero();
   double drift_rad_per_s = 0.0;  // of the circle's zero, clockwise
+  std::vector<EmulatedKnock> knocks;
 };
 
 // What stays wrong in the instrument after its own corrections, and the air between.

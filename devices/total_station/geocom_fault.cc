@@ -45,16 +45,12 @@ void GeocomFaultQueue::Add(const GeocomFault& fault, int calls) {
 void GeocomFaultQueue::Clear() {
   const std::lock_guard lock(mutex_);
   queue_.clear();
-  lasting_.reset();
+  lasting_.clear();
 }
 
-void GeocomFaultQueue::SetLasting(const std::optional<GeocomFault>& fault,
-                                  double ratio,
-                                  unsigned seed) {
+void GeocomFaultQueue::AddLasting(const GeocomFault& fault, double ratio, unsigned seed) {
   const std::lock_guard lock(mutex_);
-  lasting_ = fault;
-  ratio_ = ratio;
-  seed_ = seed;
+  lasting_.push_back({fault, ratio, seed, 0});
 }
 
 std::optional<GeocomFault> GeocomFaultQueue::Take(int rpc) {
@@ -67,9 +63,11 @@ std::optional<GeocomFault> GeocomFaultQueue::Take(int rpc) {
   } else if (found != queue_.end()) {
     fault = *found;
     queue_.erase(found);
-  } else if (lasting_ && Fits(*lasting_, rpc) &&
-             sim::UnitFrom(sim::Mixed(sim::Mixed(seed_) + ++draws_)) <= ratio_) {
-    fault = lasting_;
+  }
+  for (Lasting& one : lasting_) {
+    if (fault || !Fits(one.fault, rpc)) continue;
+    const double draw = sim::UnitFrom(sim::Mixed(sim::Mixed(one.seed) + ++one.draws));
+    if (draw <= one.ratio) fault = one.fault;
   }
   if (fault) ++taken_;
   return fault;

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <deque>
 #include <mutex>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 namespace tbm {
 
@@ -43,20 +45,23 @@ class GeocomFaultQueue {
  public:
   void Add(const GeocomFault& fault, int calls = 1);
   void Clear();
-  // In addition to the queue: this fault with this probability for every call that it fits, by
-  // draws of the seed.
-  void SetLasting(const std::optional<GeocomFault>& fault, double ratio = 1.0, unsigned seed = 1);
+  // After the queue: this fault with this probability for every call that it fits, by draws of the
+  // seed. Several may last; the first that strikes counts.
+  void AddLasting(const GeocomFault& fault, double ratio = 1.0, unsigned seed = 1);
 
   std::optional<GeocomFault> Take(int rpc);
   int taken() const;
 
  private:
+  struct Lasting {
+    GeocomFault fault;
+    double ratio;
+    std::uint64_t seed;
+    std::uint64_t draws;
+  };
   mutable std::mutex mutex_;
   std::deque<GeocomFault> queue_;
-  std::optional<GeocomFault> lasting_;
-  double ratio_ = 1.0;
-  unsigned seed_ = 1;
-  unsigned draws_ = 0;
+  std::vector<Lasting> lasting_;
   int taken_ = 0;
 };
 

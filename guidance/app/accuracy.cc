@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "devices/gsi/gsi.h"
+#include "devices/gsi/survey_csv.h"
 
 namespace tbm {
 namespace {
@@ -209,26 +210,17 @@ Result<SurveyLog, FileFault> ReadSurveyLog(std::string text,
                                            const std::string& file,
                                            std::string_view point) {
   if (LooksLikeGsi(text)) return ReadGsiLog(text, file, point);
-  constexpr std::array<std::string_view, 5> kColumns = {
-      "stamp_ns", "point", "x_mm", "y_mm", "z_mm"};
-  const auto table = CsvTable::Parse(std::move(text), file, kColumns);
-  if (!table) return Failure{table.error()};
-  const std::array<std::size_t, 3> xyz = {
-      *table->Column("x_mm"), *table->Column("y_mm"), *table->Column("z_mm")};
+  const auto rows = ReadSurveyCsv(std::move(text), file);
+  if (!rows) return Failure{rows.error()};
   SurveyLog log;
   std::set<std::string> others;
-  for (std::size_t row = 0; row < table->row_count(); ++row) {
-    const auto stamp = OptionalStamp(*table, row, *table->Column("stamp_ns"));
-    if (!stamp) return Failure{stamp.error()};
-    const auto xyz_mm = ReadXyz(*table, row, xyz);
-    if (!xyz_mm) return Failure{xyz_mm.error()};
-    const std::string_view name = table->Field(row, *table->Column("point"));
-    if (WithoutLeadingZeros(name) != WithoutLeadingZeros(point)) {
+  for (const SurveyRow& row : *rows) {
+    if (WithoutLeadingZeros(row.point) != WithoutLeadingZeros(point)) {
       ++log.other_points;
-      others.insert(std::string(name));
+      others.insert(row.point);
       continue;
     }
-    log.points.push_back({*stamp, *xyz_mm, table->line(row)});
+    log.points.push_back({row.at, Eigen::Vector3d(row.x_mm, row.y_mm, row.z_mm), row.line});
   }
   if (log.points.empty()) return Failure{NoSuchPoint(file, point, others)};
   if (auto fault = MixedStamps(log.points, file)) return Failure{std::move(*fault)};

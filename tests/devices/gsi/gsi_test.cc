@@ -6,6 +6,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "devices/gsi/gsi_record.h"
+#include "devices/gsi/gsi_writer.h"
+#include "devices/gsi/survey_csv.h"
+#include "tests/support/random.h"
+
 namespace tbm {
 namespace {
 
@@ -167,6 +172,172 @@ TEST(Gsi, SurvivesCutFlippedAndGluedBytes) {
     flipped[at / 8] = static_cast<char>(flipped[at / 8] ^ (1 << (at % 8)));
     read(flipped);
   }
+}
+
+// --- Writing ----------------------------------------------------------------------------------
+
+constexpr double kPi = std::numbers::pi;
+
+TEST(GsiWriter, WritesTheWordsOfBothFormats) {
+  GsiRecord record;
+  record.point = "P7";
+  record.horizontal_rad = kPi / 2;
+  record.zenith_rad = 1.5 * kPi;
+  record.slope_m = 30.485;
+  record.ppm = 17;
+  record.prism_constant_m = -0.0344;
+  EXPECT_EQ(*GsiLine(record, 12, {GsiWidth::kGsi8, GsiLengthUnit::kMm, GsiAngleUnit::kGon}),
+            "110012+000000P7 21...2+10000000 22...2+30000000 31...0+00030485 51....+0017-034 "
+            "58...6-00000344 \r\n");
+  GsiRecord point;
+  point.point = "GDEM 5415";
+  point.east_m = 4'000'123.45678;
+  point.north_m = -0.00001;
+  point.height_m = 0.0;
+  EXPECT_EQ(*GsiLine(point, 1, {}),
+            "*110001+0000000GDEM 5415 81...8+0000400012345678 82...8-0000000000000001 "
+            "83...8+0000000000000000 \r\n");
+}
+
+TEST(GsiWriter, EveryAngleUnitAtTheSeamsOfTheCircle) {
+  const auto angle = [](double angle_rad, GsiAngleUnit unit) {
+    GsiRecord record;
+    record.point = "1";
+    record.horizontal_rad = angle_rad;
+    const std::string line = *GsiLine(record, 1, {GsiWidth::kGsi8, GsiLengthUnit::kMm, unit});
+    return line.substr(16, 15);
+  };
+  EXPECT_EQ(angle(0.0, GsiAngleUnit::kGon), "21...2+00000000");
+  EXPECT_EQ(angle(2 * kPi, GsiAngleUnit::kGon), "21...2+00000000");
+  EXPECT_EQ(angle(-1e-12, GsiAngleUnit::kGon), "21...2+00000000");
+  EXPECT_EQ(angle(-kPi / 200 * 1e-5, GsiAngleUnit::kGon), "21...2+39999999");
+  EXPECT_EQ(angle(kPi, GsiAngleUnit::kDegree), "21...3+18000000");
+  EXPECT_EQ(angle(kPi / 180 * (35 + 45.0 / 60 + 10.5 / 3600), GsiAngleUnit::kSexagesimal),
+            "21...4+03545105");
+  // A second short of a degree by less than the last digit: the carry goes through.
+  EXPECT_EQ(angle(kPi / 180 * (36 - 0.01 / 3600), GsiAngleUnit::kSexagesimal), "21...4+03600000");
+  EXPECT_EQ(angle(kPi / 2, GsiAngleUnit::kMil), "21...5+16000000");
+}
+
+TEST(GsiWriter, WhatItWritesIsReadBackToTheLastDigit) {
+  test::Random random("WhatItWritesIsReadBack");
+  struct Case {
+    GsiFormat format;
+    double length_m;
+    double angle_rad;
+  };
+  using enum GsiLengthUnit;
+  using enum GsiAngleUnit;
+  for (const Case& one :
+       {Case{{GsiWidth::kGsi8, kMm, kGon}, 0.5e-3, kPi / 400e5},
+        Case{{GsiWidth::kGsi8, kTenthMm, kDegree}, 0.5e-4, kPi / 360e5},
+        Case{{GsiWidth::kGsi16, kHundredthMm, kSexagesimal}, 0.5e-5, kPi / 1296e4},
+        Case{{GsiWidth::kGsi16, kTenthMm, kMil}, 0.5e-4, kPi / 6400e4}}) {
+    const double far_m = one.format.width == GsiWidth::kGsi8 ? 9000.0 : 6e6;
+    for (int i = 0; i < 300; ++i) {
+      GsiRecord wrote;
+      wrote.point = "T" + std::to_string(i);
+      wrote.horizontal_rad = random.Uniform(0.0, 2 * kPi);
+      wrote.zenith_rad = random.Uniform(0.0, 2 * kPi);
+      wrote.slope_m = random.Uniform(1.0, 3000.0);
+      wrote.ppm = random.Index(200) - 100;
+      wrote.prism_constant_m = (random.Index(800) - 400) * 1e-4;
+      wrote.east_m = random.Uniform(-far_m, far_m);
+      wrote.north_m = random.Uniform(-far_m, far_m);
+      wrote.height_m = random.Uniform(-300.0, 3000.0);
+      wrote.station_east_m = random.Uniform(-far_m, far_m);
+      wrote.reflector_height_m = random.Uniform(0.0, 2.0);
+      const auto line = GsiLine(wrote, i + 1, one.format);
+      ASSERT_TRUE(line) << line.error();
+      const auto blocks = ParseGsi(*line, "t.gsi");
+      ASSERT_TRUE(blocks) << blocks.error().Text();
+      const auto read = RecordOf(blocks->at(0), "t.gsi");
+      ASSERT_TRUE(read && *read);
+      const GsiRecord& got = **read;
+      EXPECT_EQ(got.point, wrote.point);
+      const auto near_angle = [&](double a, double b) {
+        return std::abs(std::remainder(a - b, 2 * kPi)) <= 1.0001 * one.angle_rad;
+      };
+      EXPECT_TRUE(near_angle(*got.horizontal_rad, *wrote.horizontal_rad));
+      EXPECT_TRUE(near_angle(*got.zenith_rad, *wrote.zenith_rad));
+      EXPECT_NEAR(*got.slope_m, *wrote.slope_m, 1.0001 * one.length_m);
+      EXPECT_EQ(got.ppm, wrote.ppm);
+      EXPECT_NEAR(*got.prism_constant_m, *wrote.prism_constant_m, 1e-12);
+      EXPECT_NEAR(*got.east_m, *wrote.east_m, 1.0001 * one.length_m);
+      EXPECT_NEAR(*got.north_m, *wrote.north_m, 1.0001 * one.length_m);
+      EXPECT_NEAR(*got.height_m, *wrote.height_m, 1.0001 * one.length_m);
+      EXPECT_NEAR(*got.station_east_m, *wrote.station_east_m, 1.0001 * one.length_m);
+      EXPECT_NEAR(*got.reflector_height_m, *wrote.reflector_height_m, 1.0001 * one.length_m);
+      EXPECT_FALSE(got.station_north_m);
+    }
+  }
+}
+
+TEST(GsiWriter, RefusesWhatHasNoPlaceInsteadOfCuttingIt) {
+  const GsiFormat narrow{GsiWidth::kGsi8, GsiLengthUnit::kMm, GsiAngleUnit::kGon};
+  GsiRecord record;
+  record.point = "P1";
+  record.east_m = 99'999.999;
+  EXPECT_TRUE(GsiLine(record, 1, narrow));
+  record.east_m = 100'000.0;
+  EXPECT_THAT(GsiLine(record, 1, narrow).error(), HasSubstr("east: 8 digits are not enough"));
+  EXPECT_TRUE(GsiLine(record, 1, {}));
+  record.east_m = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(GsiLine(record, 1, {}).error(), HasSubstr("east: is not a number"));
+  record.east_m.reset();
+  record.zenith_rad = std::numeric_limits<double>::infinity();
+  EXPECT_THAT(GsiLine(record, 1, {}).error(), HasSubstr("zenith angle: is not a number"));
+  record.zenith_rad.reset();
+  record.prism_constant_m = 1.0;
+  EXPECT_THAT(GsiLine(record, 1, {}).error(), HasSubstr("prism constant"));
+  for (const char* name : {"", "NINELETTERS", "two\nlines", "blank "}) {
+    GsiRecord named;
+    named.point = name;
+    EXPECT_FALSE(GsiLine(named, 1, narrow)) << name;
+  }
+}
+
+TEST(GsiRecord, KeepsPointingsAndSaysWhatIsWrong) {
+  const auto record_of = [](const std::string& text) {
+    return RecordOf(ParseGsi(text, "t.gsi")->at(0), "t.gsi");
+  };
+  const auto sample = record_of(
+      "*110002+00000000GDEM5415 21.024+0000000003545100 31...0+0000000000013825 "
+      "51....+000000000017+000\n");
+  ASSERT_TRUE(sample && *sample);
+  EXPECT_EQ((*sample)->ppm, 17.0);
+  EXPECT_EQ((*sample)->prism_constant_m, 0.0);
+  EXPECT_DOUBLE_EQ(*(*sample)->slope_m, 13.825);
+  EXPECT_FALSE((*sample)->zenith_rad);
+  EXPECT_FALSE((*record_of("110001+00000001 31..00+00000000"))->slope_m) << "a failed sight";
+  EXPECT_FALSE(*record_of("410001+00000TPS"));
+  EXPECT_THAT(record_of("110001+00000001 21..00+00000100").error().Text(),
+              HasSubstr("t.gsi:1: word 21 at character 17: unit '0'"));
+  EXPECT_THAT(record_of("110001+00000001 51....+00000000").error().Text(), HasSubstr("word 51"));
+  EXPECT_THAT(record_of("110001+00000001 51....+0+00+000").error().Text(), HasSubstr("word 51"));
+}
+
+TEST(SurveyCsv, WhatItWritesIsReadBack) {
+  const SurveyRow rows[] = {{Timestamp{1'790'000'000'123'456'789}, "head", 4e9 + 0.1234, -2.5, 0.0},
+                            {std::nullopt, "say \"A\", B", 1.0, 2.0, 3.0}};
+  std::string text(kSurveyCsvHeader);
+  for (const SurveyRow& row : rows) text += SurveyCsvLine(row);
+  const auto read = ReadSurveyCsv(text, "log.csv");
+  ASSERT_TRUE(read) << read.error().Text();
+  ASSERT_EQ(read->size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(read->at(i).at, rows[i].at);
+    EXPECT_EQ(read->at(i).point, rows[i].point);
+    EXPECT_NEAR(read->at(i).x_mm, rows[i].x_mm, 0.6e-4);
+    EXPECT_NEAR(read->at(i).y_mm, rows[i].y_mm, 0.6e-4);
+    EXPECT_NEAR(read->at(i).z_mm, rows[i].z_mm, 0.6e-4);
+    EXPECT_EQ(read->at(i).line, static_cast<int>(i) + 2);
+  }
+  EXPECT_THAT(
+      ReadSurveyCsv("stamp_ns,point,x_mm,y_mm,z_mm\n1,a,1,2,nan\n", "log.csv").error().Text(),
+      HasSubstr("log.csv:2: column z_mm: 'nan' is not a finite number"));
+  EXPECT_THAT(ReadSurveyCsv("stamp_ns,point,x_mm,y_mm\n", "log.csv").error().Text(),
+              HasSubstr("log.csv:1: column z_mm: is missing"));
 }
 
 }  // namespace

@@ -283,7 +283,7 @@ TEST_F(Geocom, NoFaultOfTheLineEverMakesAWrongValue) {
     ASSERT_TRUE(Connect());
     // Setting up a connection takes ten calls: it must have a chance to succeed.
     const double ratio = kind == GeocomFaultKind::kCloses ? 0.07 : 0.3;
-    emulator_->faults().SetLasting(GeocomFault{kind, -1, 0, 5s, 0}, ratio, 7);
+    emulator_->faults().AddLasting(GeocomFault{kind, -1, 0, 5s, 0}, ratio, 7);
     int good = 0;
     for (int i = 0; i < 300; ++i) {
       if (!station_->IsConnected() && !Connect()) continue;
@@ -322,7 +322,7 @@ TEST_F(Geocom, WithoutAChecksumAFlippedBitCanPassAsAValue) {
   ASSERT_TRUE(Connect());
   EXPECT_FALSE(station_->Health().has_checksum);
   PointAt(0);
-  emulator_->faults().SetLasting(
+  emulator_->faults().AddLasting(
       GeocomFault{GeocomFaultKind::kBitError, geocom::kGetAngleAndTilt, 0, 0ns, 0}, 0.5, 3);
   int wrong = 0;
   for (int i = 0; i < 200; ++i) {
@@ -643,14 +643,14 @@ TEST_F(Geocom, GoesThroughItsLife) {
   ASSERT_TRUE(Connect());
   EXPECT_EQ(state(), StationState::kReady);
 
-  emulator_->faults().SetLasting(GeocomFault{GeocomFaultKind::kLostReply});
+  emulator_->faults().AddLasting(GeocomFault{GeocomFaultKind::kLostReply});
   EXPECT_FALSE(station_->ReadPower());
   EXPECT_EQ(state(), StationState::kSilent);
   emulator_->faults().Clear();
   EXPECT_TRUE(station_->ReadPower());
   EXPECT_EQ(state(), StationState::kReady);
 
-  emulator_->faults().SetLasting(GeocomFault{GeocomFaultKind::kLostReply});
+  emulator_->faults().AddLasting(GeocomFault{GeocomFaultKind::kLostReply});
   EXPECT_EQ(station_->ReadPower().error().why, kTimeout);
   EXPECT_EQ(station_->ReadPower().error().why, kTimeout);
   EXPECT_EQ(state(), StationState::kClosed) << "after the third";
