@@ -29,12 +29,11 @@ class Builder {
   std::optional<PlanRuns> Build() {
     const std::size_t before = remarks_.size();
     runs_.origin = StartOf(description_.plan.front()).array().round().matrix();
-    if (!runs_.origin.allFinite()) runs_.origin.setZero();
+    if (!runs_.origin.allFinite()) runs_.origin.setZero();  // told when the element is solved
     const std::vector<PlanElement> elements = Joined();
-    if (elements.empty()) return std::nullopt;
     InternalChainage at = description_.start;
     for (std::size_t i = 0; i < elements.size(); ++i) at.m += Place(i, elements[i], at);
-    if (placed_.size() != elements.size()) return std::nullopt;
+    if (placed_.size() != elements.size() || !is_joined_) return std::nullopt;
     for (std::size_t i = 1; i < placed_.size(); ++i) CheckKink(i);
     for (std::size_t i = 0; i < placed_.size(); ++i) LookForMirrors(i);
     CheckWhole(at);
@@ -70,10 +69,10 @@ class Builder {
     for (const PlanElement& element : description_.plan) {
       elements.push_back(Moved(element, -runs_.origin));
     }
-    bool is_joined = true;
-    InternalChainage at = description_.start;  // roughly: by chords
+    InternalChainage at = description_.start;
     for (std::size_t i = 0; i + 1 < elements.size(); ++i) {
-      at.m += (EndOf(elements[i]) - StartOf(elements[i])).norm();
+      const double chord_m = (EndOf(elements[i]) - StartOf(elements[i])).norm();
+      at.m += elements[i].stated.length_m.value_or(chord_m);
       const Eigen::Vector2d next = StartOf(elements[i + 1]);
       const double gap_m = (next - EndOf(elements[i])).norm();
       if (!(gap_m <= kGapOddAbove_m)) {
@@ -83,12 +82,14 @@ class Builder {
             elements[i + 1],
             at,
             gap_m);
-        if (!is_odd) SayIfSwapped(elements, i + 1, at);
-        is_joined = is_joined && is_odd;
+        if (!is_odd) {
+          SayIfSwapped(elements, i + 1, at);
+          is_joined_ = false;
+          continue;
+        }
       }
       elements[i] = WithEnd(elements[i], next);
     }
-    if (!is_joined) elements.clear();
     return elements;
   }
 
@@ -189,6 +190,7 @@ class Builder {
   AxisRemarks& remarks_;
   PlanRuns runs_;
   std::vector<Placed> placed_;
+  bool is_joined_ = true;
 };
 
 }  // namespace

@@ -12,7 +12,10 @@ constexpr double kLargest_m = 1e8;
 constexpr double kShortest_m = 1e-6;
 constexpr double kFullCircle_rad = 2.0 * std::numbers::pi;
 
-bool IsFine(const Eigen::Vector2d& p) { return p.cwiseAbs().maxCoeff() < kLargest_m; }
+// Not by maxCoeff(), which may pass over a NaN.
+bool IsFine(const Eigen::Vector2d& p) {
+  return std::abs(p.x()) < kLargest_m && std::abs(p.y()) < kLargest_m;
+}
 
 class Solver {
  public:

@@ -108,7 +108,8 @@ class TableBuilder {
     for (std::size_t i = 0; i < table_.size(); ++i) {
       const TablePoint& point = table_[i];
       const TablePoint& first = table_.front();
-      const bool is_finite = point.plan.cwiseAbs().maxCoeff() < kLargest_m &&
+      const bool is_finite = std::abs(point.plan.x()) < kLargest_m &&
+                             std::abs(point.plan.y()) < kLargest_m &&
                              std::abs(point.up_m.value_or(0.0)) < kLargest_m &&
                              std::abs(point.chainage_m.value_or(0.0)) < kLargest_m;
       if (!is_finite) refuse(AxisRemarkCode::kNotFinite, i, 0.0);
