@@ -228,12 +228,12 @@ class Reader {
     for (const std::string& text : o_.faults) {
       const auto parts = Split(text, ':');
       const auto kind = GeocomFaultFromWord(parts[0]);
-      const auto ratio = parts.size() >= 2 ? Number(parts[1]) : std::nullopt;
-      const auto code = parts.size() == 3 ? ParseInteger(parts[2]) : std::optional<std::int64_t>(0);
+      const double ratio = parts.size() >= 2 ? Number(parts[1]).value_or(-1.0) : -1.0;
+      const std::int64_t code = parts.size() == 3 ? ParseInteger(parts[2]).value_or(-1) : 0;
       const bool needs_code =
           kind == GeocomFaultKind::kReturnCode || kind == GeocomFaultKind::kComCode;
-      if (!kind || !ratio || *ratio < 0.0 || *ratio > 1.0 || !code || *code < 0 || *code > 65535 ||
-          parts.size() > 3 || needs_code != (parts.size() == 3)) {
+      const bool is_whole = parts.size() == (needs_code ? 3u : 2u);
+      if (!kind || !is_whole || ratio < 0.0 || ratio > 1.0 || code < 0 || code > 65535) {
         Wrong("fault",
               text,
               "KIND:RATIO such as late:0.05 or bit_error:0.01, or return_code:RATIO:CODE such as "
@@ -241,7 +241,7 @@ class Reader {
         continue;
       }
       station_.faults.push_back(
-          {{*kind, -1, 0, Milliseconds(o_.late_ms), static_cast<int>(*code)}, *ratio});
+          {{*kind, -1, 0, Milliseconds(o_.late_ms), static_cast<int>(code)}, ratio});
     }
   }
 
