@@ -17,6 +17,8 @@ if(TBM_SANITIZE)
     target_compile_options(tbm_options INTERFACE -fno-sanitize=null,object-size,pointer-overflow,vptr)
   endif()
   target_link_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE})
+  # Aravis asks for it; what is precompiled must have been asked the same.
+  target_compile_options(tbm_options INTERFACE -pthread)
 endif()
 
 # A test spends its time in what it tests; its own code compiles faster with less optimisation
