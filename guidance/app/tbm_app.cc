@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "guidance/app/axis_options.h"
 #include "guidance/app/check_command.h"
 #include "guidance/app/completion.h"
 #include "guidance/app/solve_command.h"
@@ -28,6 +29,8 @@ constexpr const char* kExamples =
     "      a pose for every picture of a recorded run, with its sigma and its bound\n"
     "  tbm check poses.csv station.gsi --point shield_head --align rigid --report report\n"
     "      how far these poses are from what the total station measured\n"
+    "  tbm axis check tests/data/axis/example.xml\n"
+    "      what is odd in the file of a design axis; eval, project and plot work on it\n"
     "  tbm watch\n"
     "      the live values of a running camera box\n"
     "\n"
@@ -120,6 +123,7 @@ struct Requests {
   CheckRequest check;
   StudyRequest study;
   WatchRequest watch;
+  AxisRequests axis;
   std::string align = "none";
   std::string format = "csv";
   std::string method = "fused";
@@ -239,6 +243,7 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   const CLI::App* solve = AddSolve(app, requests);
   const CLI::App* centres = AddCentres(app, requests);
   const CLI::App* check = AddCheck(app, requests);
+  const CLI::App* axis = AddAxis(app, requests.axis);
   const CLI::App* study = AddStudy(app, requests);
   const CLI::App* watch = AddWatch(app, requests);
   const CLI::App* completion = AddCompletion(app, requests);
@@ -257,6 +262,7 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   if (solve->parsed()) return RunSolve(requests.solve, console);
   if (centres->parsed()) return RunCentres(requests.centres, console);
   if (check->parsed()) return RunCheck(requests.check, console);
+  if (axis->parsed()) return RunAxis(*axis, requests.axis, console);
   if (study->parsed()) return RunStudy(requests.study, console);
   if (watch->parsed()) return RunWatch(requests.watch, console);
   if (completion->parsed()) {

@@ -118,7 +118,9 @@ class Builder {
     const SolvedElement& solved = placed.solved;
     const double stated_m = placed.moved.stated.length_m.value_or(solved.length_m);
     const bool is_rounding = std::abs(stated_m - solved.length_m) <= kGapRefusedAbove_m;
-    return is_rounding || solved.is_length_along_tangent ? stated_m : solved.length_m;
+    const bool counts = is_rounding || solved.is_length_along_tangent;
+    // An element of a few millimetres must not lose its length to rounding.
+    return counts && stated_m > 0.5 * solved.length_m ? stated_m : solved.length_m;
   }
 
   double KinkBefore(std::size_t i, const SolvedElement& element) const {
@@ -202,7 +204,8 @@ bool IsRefused(const AxisRemarks& remarks) {
 }
 
 std::optional<PlanRuns> BuildPlanRuns(const AxisDescription& description, AxisRemarks* remarks) {
-  if (!std::isfinite(description.start.m)) {
+  constexpr double kLargest_m = 1e8;
+  if (!(std::abs(description.start.m) < kLargest_m)) {
     remarks->push_back({AxisRemarkCode::kNotFinite, Severity::kRefused, 0, {}, 0.0});
     return std::nullopt;
   }
