@@ -159,7 +159,7 @@ void GeocomEmulator::Abort(SteadyTime now) {
                                       pending_->with_checksum);
 }
 
-void GeocomEmulator::SayNow(std::string reply, SteadyTime now, PtyOutbox& outbox) {
+void GeocomEmulator::SayNow(const std::string& reply, SteadyTime now, PtyOutbox& outbox) {
   outbox.At(now + options_.think_time, ToBytes(reply));
 }
 

@@ -89,7 +89,7 @@ class GeocomEmulator final : public PtyInstrument {
   void OnRequest(const GeocomRequest& request, SteadyTime now, PtyOutbox& outbox);
   void Abort(SteadyTime now);
   void Say(const Pending& pending, PtyOutbox& outbox);
-  void SayNow(std::string reply, SteadyTime now, PtyOutbox& outbox);
+  void SayNow(const std::string& reply, SteadyTime now, PtyOutbox& outbox);
   std::string BitFlipped(std::string reply);
 
   // Empty: no such procedure.

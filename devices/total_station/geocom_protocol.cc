@@ -89,7 +89,7 @@ Result<LineParts, GeocomLineFault> TakeApart(std::string_view line, std::string_
 }
 
 std::string WithChecksum(std::string_view numbers, std::string_view rest, bool with_checksum) {
-  const std::string plain = fmt::format("{}:{}", numbers, rest);
+  std::string plain = fmt::format("{}:{}", numbers, rest);
   if (!with_checksum) return plain;
   return fmt::format("{},{}:{}", numbers, Crc16Arc(plain), rest);
 }

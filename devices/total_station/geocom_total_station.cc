@@ -198,7 +198,7 @@ Result<PolarObservation, StationFault> GeocomTotalStation::Measure() {
                              config_.answer_timeout,
                              false});
   if (!started) return Failure{started.error()};
-  if (started->return_code != geocom::kOk) {
+  if (FailureOfGeocomCode(started->return_code)) {
     return Failure{Failed(FaultOfCode(started->return_code))};
   }
   const auto answer = AwaitDistance();
@@ -216,8 +216,7 @@ GeocomTotalStation::Answer GeocomTotalStation::AwaitDistance() {
           .count());
   const std::string parameters = fmt::format("{},1", wait_ms);
   if (has_full_measure_) {
-    const auto answer =
-        Ask({geocom::kGetFullMeasure, parameters, 8, config_.measure_timeout, false});
+    auto answer = Ask({geocom::kGetFullMeasure, parameters, 8, config_.measure_timeout, false});
     const int code = answer ? answer->return_code : answer.error().return_code;
     if (FailureOfGeocomCode(code) != kNotSupported) return answer;
     has_full_measure_ = false;

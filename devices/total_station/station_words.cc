@@ -32,7 +32,7 @@ constexpr std::array<FailureRow, 27> kFailures = {{
     {"bad_environment",
      "Dust, vibration or a lamp keeps the total station from finding the prism."},
     {"inaccurate", "The telescope did not reach its position or the prism within the tolerance."},
-    {"no_lock", "The prism is not locked."},
+    {"no_lock", "The prism is not locked, or target recognition is switched off."},
     {"motor", "A drive of the total station does not do what it should."},
     {"angle_sensor", "A circle of the total station cannot be read."},
     {"distance", "The distance could not be measured: weak signal or a broken beam."},

@@ -32,7 +32,7 @@ enum class StationFailure {
   kSeveralTargets = 15,   // more than one prism in the field of view
   kBadEnvironment = 16,   // dust, vibration, a light source: target recognition does not settle
   kInaccurate = 17,       // positioning or target recognition missed its tolerance
-  kNoLock = 18,           // the prism is not locked
+  kNoLock = 18,           // the prism is not locked, or target recognition is off
   kMotor = 19,            // a drive does not do what it should
   kAngleSensor = 20,      // a circle cannot be read
   kDistance = 21,         // the distance meter failed: signal, beam broken, setting

@@ -464,6 +464,18 @@ TEST_F(Geocom, TheStartOfADistanceIsNeverToldTwice) {
   }
 }
 
+// Whether the old distance is forgotten must be known before a new one is started.
+TEST_F(Geocom, NothingIsMeasuredUntilTheOldDistanceIsCleared) {
+  ASSERT_TRUE(Connect());
+  PointAt(0);
+  const int before = emulator_->carried_out(geocom::kDoMeasure);
+  Fault(GeocomFaultKind::kLostRequest, geocom::kDoMeasure);
+  Fault(GeocomFaultKind::kLostRequest, geocom::kDoMeasure);
+  EXPECT_EQ(station_->Measure().error().why, kTimeout);
+  EXPECT_EQ(emulator_->carried_out(geocom::kDoMeasure), before);
+  EXPECT_TRUE(station_->Measure());
+}
+
 TEST_F(Geocom, AnAnsweredDistanceMayBeAskedForAgain) {
   ASSERT_TRUE(Connect());
   PointAt(0);
