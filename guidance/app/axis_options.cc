@@ -68,7 +68,9 @@ void AddEval(CLI::App* axis, AxisRequests& requests) {
   CLI::App* eval = axis->add_subcommand("eval", "Point, direction, gradient, cant at a chainage");
   eval->footer(kEvalHelp);
   AddSource(eval, requests);
-  CLI::Option* at = eval->add_option("--at", request.at_m, "chainages");
+  CLI::Option* at = eval->add_option("--at", request.at_m, "chainage; several with commas")
+                        ->allow_extra_args(false)
+                        ->delimiter(',');
   eval->add_option("--from", request.from_m, "first chainage; the start")->excludes(at);
   eval->add_option("--to", request.to_m, "last chainage; the end")->excludes(at);
   eval->add_option("--step", request.step_m, "metres from row to row")

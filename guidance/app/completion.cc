@@ -16,7 +16,7 @@ struct Choice {
 };
 
 struct Command {
-  std::string name;
+  std::string name;  // "axis check" for a command below a command
   std::string help;
   std::vector<Choice> options;
   std::vector<Choice> positionals;
@@ -42,24 +42,32 @@ Choice ChoiceOf(const CLI::Option& option) {
   return choice;
 }
 
-Command CommandOf(const CLI::App& app) {
-  Command command{app.get_name(), app.get_description(), {}, {}, {}};
+std::vector<const CLI::App*> SubcommandsOf(const CLI::App& app) {
+  return app.get_subcommands([](const CLI::App*) { return true; });
+}
+
+Command CommandOf(const CLI::App& app, const std::string& name) {
+  Command command{name, app.get_description(), {}, {}, {}};
   for (const CLI::Option* option : app.get_options()) {
     (option->get_positional() ? command.positionals : command.options).push_back(ChoiceOf(*option));
   }
-  for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
-    command.subcommands.push_back(sub->get_name());
-  }
+  for (const CLI::App* sub : SubcommandsOf(app)) command.subcommands.push_back(sub->get_name());
   return command;
 }
 
+// The program first, then each command, followed by the commands below it.
 std::vector<Command> CommandsOf(const CLI::App& app) {
-  std::vector<Command> commands = {CommandOf(app)};
-  for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
-    commands.push_back(CommandOf(*sub));
+  std::vector<Command> commands = {CommandOf(app, app.get_name())};
+  for (const CLI::App* sub : SubcommandsOf(app)) {
+    commands.push_back(CommandOf(*sub, sub->get_name()));
+    for (const CLI::App* below : SubcommandsOf(*sub)) {
+      commands.push_back(CommandOf(*below, sub->get_name() + " " + below->get_name()));
+    }
   }
   return commands;
 }
+
+bool IsBelowAnother(const Command& command) { return command.name.find(' ') != std::string::npos; }
 
 std::string Joined(const std::vector<std::string>& words) {
   return fmt::format("{}", fmt::join(words, " "));
@@ -93,6 +101,40 @@ std::string ZshAction(const Choice& choice) {
                                : fmt::format(":value:({})", Joined(choice.values));
 }
 
+// The arguments of one command, for _arguments. `indent` is that of its lines.
+std::string ZshArguments(const Command& command, const std::string& indent) {
+  std::string text = indent + "_arguments";
+  for (const Choice& option : command.options) {
+    for (const std::string& name : option.names) {
+      text += fmt::format(" \\\n{}  '{}[{}]{}'",
+                          indent,
+                          name,
+                          ZshQuoted(option.help),
+                          option.takes_value ? ZshAction(option) : "");
+    }
+  }
+  for (std::size_t k = 0; k < command.positionals.size(); ++k) {
+    text += fmt::format(" \\\n{}  '{}{}'", indent, k + 1, ZshAction(command.positionals[k]));
+  }
+  return text;
+}
+
+// A command that has commands of its own: their names first, then their arguments.
+std::string ZshNested(const Command& command, const std::vector<Command>& commands) {
+  std::string text = fmt::format(
+      "      if (( CURRENT == 2 )); then\n        compadd {}\n        return\n      fi\n"
+      "      local below=$words[2]\n      shift words\n      (( CURRENT-- ))\n"
+      "      case $below in\n",
+      Joined(command.subcommands));
+  for (const std::string& name : command.subcommands) {
+    for (const Command& below : commands) {
+      if (below.name != command.name + " " + name) continue;
+      text += fmt::format("        {})\n{} ;;\n", name, ZshArguments(below, "          "));
+    }
+  }
+  return text + "      esac ;;\n";
+}
+
 }  // namespace
 
 std::string BashCompletion(const CLI::App& app) {
@@ -103,6 +145,14 @@ std::string BashCompletion(const CLI::App& app) {
       "  local word=\"${COMP_WORDS[COMP_CWORD]}\" before=\"${COMP_WORDS[COMP_CWORD-1]}\" "
       "command=''\n"
       "  [ \"$COMP_CWORD\" -gt 1 ] && command=\"${COMP_WORDS[1]}\"\n"
+      "  case \"$command ${COMP_WORDS[2]}\" in\n";
+  for (const Command& command : commands) {
+    if (!IsBelowAnother(command)) continue;
+    text += fmt::format(
+        "    '{}') [ \"$COMP_CWORD\" -gt 2 ] && command='{}' ;;\n", command.name, command.name);
+  }
+  text +=
+      "  esac\n"
       "  local options='' words='' files=yes\n"
       "  case \"$command\" in\n";
   for (std::size_t i = 0; i < commands.size(); ++i) {
@@ -118,7 +168,7 @@ std::string BashCompletion(const CLI::App& app) {
                       Joined(option.values));
     }
     const auto words = BareWords(command);
-    text += fmt::format("    {})\n", i == 0 ? "''" : command.name);
+    text += fmt::format("    '{}')\n", i == 0 ? "" : command.name);
     if (!value_cases.empty()) text += "      case \"$before\" in\n" + value_cases + "      esac\n";
     text += fmt::format("      options='{}'; words='{}'{} ;;\n",
                         Joined(options),
@@ -145,6 +195,7 @@ std::string ZshCompletion(const CLI::App& app) {
       "#compdef tbm\n# zsh completion of tbm; use: source <(tbm completion zsh)\n"
       "_tbm() {\n  local -a commands\n  commands=(\n";
   for (std::size_t i = 1; i < commands.size(); ++i) {
+    if (IsBelowAnother(commands[i])) continue;
     text += fmt::format("    '{}:{}'\n", commands[i].name, ZshQuoted(commands[i].help));
   }
   text += "  )\n  if (( CURRENT == 2 )); then\n    _describe command commands\n    _arguments";
@@ -157,19 +208,10 @@ std::string ZshCompletion(const CLI::App& app) {
       "\n    return\n  fi\n  local command=$words[2]\n  shift words\n  (( CURRENT-- ))\n  case "
       "$command in\n";
   for (std::size_t i = 1; i < commands.size(); ++i) {
-    text += fmt::format("    {})\n      _arguments", commands[i].name);
-    for (const Choice& option : commands[i].options) {
-      for (const std::string& name : option.names) {
-        text += fmt::format(" \\\n        '{}[{}]{}'",
-                            name,
-                            ZshQuoted(option.help),
-                            option.takes_value ? ZshAction(option) : "");
-      }
-    }
-    for (std::size_t k = 0; k < commands[i].positionals.size(); ++k) {
-      text += fmt::format(" \\\n        '{}{}'", k + 1, ZshAction(commands[i].positionals[k]));
-    }
-    text += " ;;\n";
+    if (IsBelowAnother(commands[i])) continue;
+    text += fmt::format("    {})\n", commands[i].name);
+    text += commands[i].subcommands.empty() ? ZshArguments(commands[i], "      ") + " ;;\n"
+                                            : ZshNested(commands[i], commands);
   }
   text += "  esac\n}\n";
   // Sourced it registers itself; as a file in $fpath the first line does.

@@ -290,6 +290,26 @@ TEST_F(Tbm, TheStudyIsTheSameForAnyNumberOfThreadsAndShowsWhatTheTiltsBuy) {
   EXPECT_EQ(Run(quick + Path("a")), 2) << "not over existing results";
 }
 
+TEST_F(Tbm, AxisCommandsTakeTheirOptions) {
+  const std::string file = TBM_SOURCE_DIR "/tests/data/axis/example.xml";
+  ASSERT_EQ(Run("axis eval --at 10250,10655 " + file + " --origin 4000 12000 400"), 0) << err_;
+  const auto rows = Rows(out_);
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_EQ(rows[2][1], "10685.000000");
+  EXPECT_NEAR(std::stod(rows[1][3]), 666.986454, 2e-6) << "example_table.csv less 4000";
+  EXPECT_EQ(Run("axis eval " + file + " --official --at 10690"), 0);
+  EXPECT_EQ(Rows(out_).size(), 3u) << "the number stands twice";
+  EXPECT_EQ(Run("axis eval " + file + " --at 10250 --from 10000"), 2);
+  EXPECT_EQ(Run("axis project " + file + " " TBM_SOURCE_DIR "/tests/data/axis/example_shots.csv"),
+            0);
+  EXPECT_EQ(Rows(out_).size(), 17u);
+  EXPECT_EQ(Run("axis check " + file + " --format json"), 0);
+  EXPECT_EQ(nlohmann::json::parse(out_)["usable"], true);
+  EXPECT_EQ(Run("axis check " + file + " --alignment south"), 2);
+  EXPECT_THAT(err_, HasSubstr("'north tube'"));
+  EXPECT_EQ(Run("axis"), 2);
+}
+
 TEST_F(Tbm, CompletionKnowsCommandsOptionsAndChoices) {
   ASSERT_EQ(Run("completion bash"), 0);
   const std::string script = Path("tbm.bash");
@@ -306,6 +326,8 @@ TEST_F(Tbm, CompletionKnowsCommandsOptionsAndChoices) {
   EXPECT_EQ(complete("tbm solve --met", 2), "--method\n");
   EXPECT_EQ(complete("tbm solve --method v", 3), "vision\n");
   EXPECT_EQ(complete("tbm completion z", 2), "zsh\n");
+  EXPECT_EQ(complete("tbm axis ev", 2), "eval\n");
+  EXPECT_EQ(complete("tbm axis check --format j", 4), "json\n");
   ASSERT_EQ(Run("completion zsh"), 0);
   EXPECT_THAT(out_, HasSubstr("'--method[estimator]:value:(fused published vision)'"));
 }
