@@ -306,6 +306,34 @@ TEST(AxisFile, TakesPrefixesReferencesAndPolylines) {
   EXPECT_FALSE(axis.At({0.5})->up_m.has_value());
 }
 
+// Each file holds one spiral that leaves the north direction to the right; its end was computed by
+// a Simpson rule from the published formula. Under another law the chord would turn the start away.
+TEST(AxisFile, ReadsEverySpiralTypeThatHasAFormula) {
+  for (const char* type : {"clothoid",
+                           "bloss",
+                           "cosine",
+                           "sinusoid",
+                           "biquadratic",
+                           "weinerBogen",
+                           "cubic",
+                           "cubicParabola",
+                           "japaneseCubic",
+                           "sineHalfWave",
+                           "biquadraticParabola"}) {
+    SCOPED_TRACE(type);
+    const auto loaded = Loaded(
+        ReadText(std::string(TBM_SOURCE_DIR "/tests/fuzz/seeds/axis_file_fuzz/") + type + ".xml"));
+    EXPECT_TRUE(Inspect(loaded.description).empty());
+    const DesignAxis axis = Built(loaded);
+    const auto start = axis.At(axis.start());
+    const auto end = axis.At(axis.end());
+    EXPECT_NEAR(std::remainder(start->bearing_rad, 2.0 * M_PI), 0.0, 1e-9);
+    EXPECT_NEAR(start->curvature_right_per_m, 0.0, 1e-9);
+    EXPECT_GT(end->bearing_rad, 0.1) << "cw is to the right";
+    EXPECT_GT(end->curvature_right_per_m, 0.9 / 400.0);
+  }
+}
+
 TEST(AxisFile, EachBadFileNamesItsLineAndPlace) {
   for (const BadFile& bad : kBadFiles) {
     SCOPED_TRACE(bad.name);
