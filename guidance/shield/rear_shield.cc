@@ -295,6 +295,12 @@ Result<RearShieldFix, RearShieldFailure> FixWith(const RearShieldProblem& proble
   fix.dof = dof;
   fix.prisms_used = std::popcount(prisms);
   fix.rms_m = rms_m;
+  if (problem.up) {
+    // The rows are whitened, and their residual is minus the reading's error.
+    const double sigma = std::max(problem.up->sigma_rad, kLeastSigma);
+    fix.by_up =
+        -covariance.topRows<6>() * system.rows.middleRows<2>(system.fix_rows).transpose() / sigma;
+  }
   fix.left_out = naming.left_out;
   fix.exchanged = naming.exchanged;
   return fix;

@@ -77,7 +77,10 @@ struct RearShieldFix {
   double chi2 = 0.0;
   int dof = 0;  // 0: nothing checks anything
   int prisms_used = 0;
-  double rms_m = 0.0;                           // of the prisms' residuals, per coordinate
+  double rms_m = 0.0;  // of the prisms' residuals, per coordinate
+  // What an error of the up reading does to this pose: (turn, shift) by the reading's error turned
+  // into `site`, its east and north part. Zero without an up reading.
+  Eigen::Matrix<double, 6, 2> by_up = Eigen::Matrix<double, 6, 2>::Zero();
   std::optional<int> left_out;                  // a prism that disagreed with all the rest
   std::optional<std::array<int, 2>> exchanged;  // two prisms taken for each other, put right here
 };
