@@ -174,8 +174,6 @@ TEST(Gsi, SurvivesCutFlippedAndGluedBytes) {
   }
 }
 
-// --- Writing ----------------------------------------------------------------------------------
-
 constexpr double kPi = std::numbers::pi;
 
 TEST(GsiWriter, WritesTheWordsOfBothFormats) {

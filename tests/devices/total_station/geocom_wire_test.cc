@@ -204,8 +204,6 @@ INSTANTIATE_TEST_SUITE_P(Lines,
                                          TotalStationDriver::kGeocomSerial),
                          [](const auto& line) { return std::string(WordOf(line.param)); });
 
-// --- What cannot be opened --------------------------------------------------------------------
-
 TEST(GeocomPorts, SayWhyTheyCannotBeOpened) {
   const test::TempFolder folder;
   const SystemClock clock;
@@ -233,8 +231,6 @@ TEST(GeocomPorts, SayWhyTheyCannotBeOpened) {
   ASSERT_TRUE(first->Connect(steady_clock::now() + 1s));
   EXPECT_EQ(why(), kRefused) << "locked by the first";
 }
-
-// --- The simulator program --------------------------------------------------------------------
 
 TEST(TotalStationSim, IsAStationForWhoeverConnects) {
   const test::TempFolder folder;
