@@ -225,6 +225,29 @@ TEST_F(Geocom, NoFaultOfTheLineEverMakesAWrongValue) {
   }
 }
 
+// The whole cycle of a process, on a line where every seventh call goes wrong: whenever turning and
+// measuring both say that all is well, the numbers are those of the prism that was meant.
+TEST_F(Geocom, NoFaultOfTheLineGivesOnePrismTheNumbersOfAnother) {
+  for (const GeocomFaultKind kind : kLineFaults) {
+    Start();
+    ASSERT_TRUE(Connect());
+    const double ratio = kind == GeocomFaultKind::kCloses ? 0.05 : 0.15;
+    emulator_->faults().AddLasting(GeocomFault{kind, -1, 0, 5s, 0}, ratio, 11);
+    int good = 0;
+    for (std::size_t i = 0; i < 120; ++i) {
+      if (!station_->IsConnected() && !Connect()) continue;
+      const auto truth = SightOf(Prism(i % 4));
+      if (!station_->TurnTo(truth.circles, Aim::kPrism)) continue;
+      const auto observation = station_->Measure();
+      if (!observation || !observation->slope_m) continue;
+      ++good;
+      ExpectNear(observation->circles, truth.circles, 1e-12);
+      ASSERT_NEAR(*observation->slope_m, truth.slope_m, 1e-9) << static_cast<int>(kind);
+    }
+    EXPECT_GT(good, 50) << static_cast<int>(kind);
+  }
+}
+
 TEST_F(Geocom, LateAnswersAreThrownAwayAndCounted) {
   ASSERT_TRUE(Connect());
   PointAt(0);
