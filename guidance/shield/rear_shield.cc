@@ -330,7 +330,7 @@ Result<RearShieldFix, RearShieldFailure> FixRearShield(const RearShieldProblem& 
   const int prisms = static_cast<int>(problem.prisms.size());
   for (const PrismFix& fix : problem.fixes) TBM_CHECK(fix.prism >= 0 && fix.prism < prisms);
   if (!IsFinite(problem)) return Failure{RearShieldFailure::kNotFinite};
-  const Result<RearShieldFix, RearShieldFailure> all = FixWith(problem, options, {});
+  Result<RearShieldFix, RearShieldFailure> all = FixWith(problem, options, {});
   if (!all && all.error() != RearShieldFailure::kNotConverged) return all;
   if (all && Agrees(*all, options.gate_risk)) return all;
 
