@@ -56,7 +56,7 @@ double WorstDistance(const Plan& plan,
                      const Placement& placement) {
   double worst_m = 0.0;
   TruthState state;
-  constexpr int kSteps = 60;
+  constexpr int kSteps = 25;
   for (int i = 0; i <= kSteps; ++i) {
     const Real from = static_cast<Real>(length_m) * std::max(i - 1, 0) / kSteps;
     const Real to = static_cast<Real>(length_m) * i / kSteps;
@@ -190,6 +190,28 @@ TEST(Plan, HeightsOverTheTangentAgreeWithTheirFormula) {
         const Eigen::Vector2d expected = placement(x, graph.height(x, parameter, kRadius));
         EXPECT_LT((point.place - expected).norm(), 1e-9) << static_cast<double>(x);
       }
+    }
+  }
+}
+
+// A negative radius turns to the other side: the mirrored spiral written the other way.
+TEST(Plan, NegativeRadiusTurnsToTheOtherSide) {
+  for (const SpiralLaw law :
+       {SpiralLaw::kClothoid, SpiralLaw::kJapaneseCubic, SpiralLaw::kCubicSpiral}) {
+    SpiralElement spiral;
+    spiral.law = law;
+    spiral.length_m = 80.0;
+    spiral.turning = Turning::kLeft;
+    spiral.curvature_end_per_m = -1.0 / 300.0;
+    const auto negative = SpiralShape(spiral, LengthMeaning::kAlongCurve);
+    spiral.turning = Turning::kRight;
+    spiral.curvature_end_per_m = 1.0 / 300.0;
+    const auto mirrored = SpiralShape(spiral, LengthMeaning::kAlongCurve);
+    ASSERT_TRUE(negative && mirrored);
+    EXPECT_LT(negative->turn_rad(80.0), -0.1);
+    for (const double s_m : {10.0, 40.0, 80.0}) {
+      EXPECT_NEAR(negative->turn_rad(s_m), mirrored->turn_rad(s_m), 1e-15);
+      EXPECT_NEAR(negative->curvature_left_per_m(s_m), mirrored->curvature_left_per_m(s_m), 1e-15);
     }
   }
 }
