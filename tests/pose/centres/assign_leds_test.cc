@@ -454,6 +454,25 @@ TEST(AssignLeds, SaysWhenThereAreTooFewSpots) {
   EXPECT_EQ(Assign(FieldRig(), draw).error(), AssignFailure::kTooFewCentres);
 }
 
+// With limits 0.3 m this side of the board, and 0.3 m beyond it; with a pose of a moment ago too.
+TEST(AssignLeds, WhatStandsOutsideTheDistancesIsNotTheTarget) {
+  Random random("assign_distances");
+  for (int i = 0; i < 100; ++i) {
+    const bool with_prior = i % 2 == 0;
+    const DrawOptions visible = Visible(5, 5, FalseSpots::kUniform, 2);
+    const Draw draw = DrawFrame(FieldRig(), with_prior ? WithPrior(visible) : visible, random);
+    AssignOptions nearer;
+    nearer.max_distance_m = draw.truth.camera_from_target.translation.z() - 0.3;
+    AssignOptions farther;
+    farther.min_distance_m = draw.truth.camera_from_target.translation.z() + 0.3;
+    for (const AssignOptions& options : {nearer, farther}) {
+      EXPECT_FALSE(AssignLeds(
+          FieldRig(), draw.centres, draw.target_tilt, draw.camera_tilt, draw.prior, options));
+    }
+    EXPECT_TRUE(Assign(FieldRig(), draw));
+  }
+}
+
 // Two spots so near each other that every pair of LEDs would be beyond the greatest distance.
 TEST(AssignLeds, SaysWhenNoSetOfSpotsCanBeTheTarget) {
   Random random("assign_no_match");
