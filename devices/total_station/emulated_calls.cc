@@ -96,7 +96,7 @@ std::optional<GeocomEmulator::Outcome> GeocomEmulator::Settings(int rpc,
     case geocom::kGetPrismConstant:
       return says(GeocomNumber(instrument_.prism_constant_m));
     case geocom::kSetPrismConstant:
-      instrument_.prism_constant_m = p[0];
+      if (!options_.ignores_prism_constant) instrument_.prism_constant_m = p[0];
       return Outcome{};
     case geocom::kGetAtmospherePpm:
       return says(GeocomNumber(instrument_.ppm));

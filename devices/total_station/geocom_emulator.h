@@ -26,8 +26,9 @@ struct GeocomEmulatorOptions {
   std::string model = "TS16 A";
   std::int64_t serial_number = 3'512'345;
   EmulatedChecksum checksum = EmulatedChecksum::kKnown;
-  bool is_old = false;      // the calls of the TPS1100 only: 3081 for newer ones
-  bool is_licensed = true;  // robotic functions; else return code 27
+  bool is_old = false;                  // the calls of the TPS1100 only: 3081 for newer ones
+  bool is_licensed = true;              // robotic functions; else return code 27
+  bool ignores_prism_constant = false;  // says done, and keeps that of its prism type
   int battery_percent = 87;
   int temperature_celsius = 21;
   std::chrono::nanoseconds think_time = std::chrono::milliseconds(5);

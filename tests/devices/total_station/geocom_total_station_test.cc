@@ -158,10 +158,14 @@ TEST_F(Geocom, PrismConstantAndAtmosphereAreSetReadBackAndApplied) {
 
 TEST_F(Geocom, ASettingThatIsNotTakenIsAFailure) {
   ASSERT_TRUE(Connect());
-  // Answered with "done", and not done.
   Fault(GeocomFaultKind::kReturnCode, geocom::kSetPrismConstant, 0, 0ns, 3);
   EXPECT_EQ(station_->SetPrismConstant(0.03).error(), (StationFault{kInstrument, 3}));
-  ASSERT_TRUE(station_->SetPrismConstant(0.03));
+  emulator_->Change([](GeocomEmulatorOptions& options) { options.ignores_prism_constant = true; });
+  EXPECT_EQ(station_->SetPrismConstant(0.03).error().why, kSettingNotTaken);
+  PointAt(0);
+  EXPECT_EQ(station_->Measure()->prism_constant_m, 0.0) << "what is applied is told";
+  emulator_->Change([](GeocomEmulatorOptions& options) { options.ignores_prism_constant = false; });
+  EXPECT_TRUE(station_->SetPrismConstant(0.03));
 }
 
 TEST_F(Geocom, ImplausibleValuesAreRefused) {
