@@ -88,9 +88,10 @@ class Solver {
       const double off_m = std::abs(to_centre.norm() - (*curve.centre - curve.end).norm());
       if (SayDistance(AxisRemarkCode::kCentreOff, off_m)) return std::nullopt;
     }
-    if (!curve.centre || IsRadiusBetter(curve, chord_m, radius_m)) {
-      if (!HeightFromRadius(curve, chord_m, &height_m, &radius_m)) return std::nullopt;
+    if (!curve.centre && !HeightFromRadius(curve, chord_m, &height_m, &radius_m)) {
+      return std::nullopt;
     }
+    if (!CompareRadius(curve, chord_m, radius_m)) return std::nullopt;
     const double turn_rad = 2.0 * std::atan2(0.5 * chord_m, height_m);
     const double length_m = radius_m * turn_rad;
     const double other_way_m = radius_m * (kFullCircle_rad - turn_rad);
@@ -104,28 +105,25 @@ class Solver {
     return ArcShape(length_m, side / radius_m);
   }
 
-  // The stated radius makes a short arc more exact than its rounded centre does, but has no say
-  // near half a circle.
-  bool IsRadiusBetter(const CurveElement& curve, double chord_m, double radius_m) {
-    if (!curve.radius_m) return false;
+  // False when the stated radius bends the arc elsewhere.
+  bool CompareRadius(const CurveElement& curve, double chord_m, double radius_m) {
+    if (!curve.radius_m) return true;
     const double stated_m = std::abs(*curve.radius_m);
     // What the difference moves the middle of the arc by.
     const double bend = chord_m * chord_m / (8.0 * radius_m * radius_m);
     const double off_m = std::min(bend, 1.0) * std::abs(stated_m - radius_m);
-    if (!(off_m <= kGapOddAbove_m)) {
-      AxisRemark remark;
-      remark.code = AxisRemarkCode::kValueDisagrees;
-      remark.quantity = StatedQuantity::kRadius;
-      remark.severity = off_m <= kGapRefusedAbove_m ? Severity::kOdd : Severity::kRefused;
-      remark.line = element_.line;
-      remark.at = at_;
-      remark.size = off_m;
-      remark.stated = stated_m;
-      remark.computed = radius_m;
-      remarks_.push_back(remark);
-      return false;
-    }
-    return chord_m < 1.5 * stated_m;
+    if (off_m <= kGapOddAbove_m) return true;
+    AxisRemark remark;
+    remark.code = AxisRemarkCode::kValueDisagrees;
+    remark.quantity = StatedQuantity::kRadius;
+    remark.severity = off_m <= kGapRefusedAbove_m ? Severity::kOdd : Severity::kRefused;
+    remark.line = element_.line;
+    remark.at = at_;
+    remark.size = off_m;
+    remark.stated = stated_m;
+    remark.computed = radius_m;
+    remarks_.push_back(remark);
+    return remark.severity == Severity::kOdd;
   }
 
   bool HeightFromRadius(const CurveElement& curve,
@@ -142,7 +140,7 @@ class Solver {
       (void)Refused(AxisRemarkCode::kRadiusTooSmall, 0.5 * chord_m - stated_m);
       return false;
     }
-    *height_m = *height_m < 0.0 ? -std::sqrt(square) : std::sqrt(square);
+    *height_m = std::sqrt(square);
     *radius_m = stated_m;
     return true;
   }

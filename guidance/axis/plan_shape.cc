@@ -116,7 +116,7 @@ struct FromStraightEnd {
 };
 
 // Walked from the straight end, or towards it; to the left or to the right.
-PlanShape Walked(FromStraightEnd way, bool starts_straight, double side) {
+PlanShape Walked(const FromStraightEnd& way, bool starts_straight, double side) {
   PlanShape shape;
   const double length_m = way.length_m;
   shape.length_m = length_m;

@@ -272,6 +272,18 @@ TEST(DesignAxis, CountsChainageAsTheFileDoes) {
   EXPECT_NEAR(axis.Project({40.0, 1.0, 0.0})->chainage.m, 40.002, 1e-12);
 }
 
+// An element as short as the rounding of its length keeps the length it has.
+TEST(DesignAxis, AnElementOfMillimetresHasALength) {
+  AxisDescription description;
+  description.plan = {{LineElement{{0.0, 0.0}, {10.0, 0.0}}, {}, 1},
+                      {LineElement{{10.0, 0.0}, {10.004, 0.0}}, {}, 2},
+                      {LineElement{{10.004, 0.0}, {20.0, 0.0}}, {}, 3}};
+  description.plan[1].stated.length_m = 0.0;
+  const DesignAxis axis = Built(description);
+  EXPECT_NEAR(axis.end().m, 20.0, 1e-12);
+  EXPECT_NEAR(axis.At({10.002})->p_plan_in_site.x(), 10.002, 1e-12);
+}
+
 TEST(DesignAxis, FrameOfTheAxisHasThePointsDeviationsAsCoordinates) {
   MadeAxis made = test::MakeDrive({{500.0, -300.0}, 2.0}, 0.0);
   const DesignAxis flat = Built(made.description);

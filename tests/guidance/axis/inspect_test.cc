@@ -125,6 +125,34 @@ TEST(Inspect, RecognisesMirroredElements) {
   EXPECT_EQ(Find(spiral, AxisRemarkCode::kTurningMirrored)->line, 11);
 }
 
+// Without neighbours the stated PI, or length, tells.
+TEST(Inspect, RecognisesAMirroredElementThatStandsAlone) {
+  const AxisDescription drive = Drive().description;
+  AxisDescription alone;
+  alone.plan = {drive.plan[kClothoid]};
+  auto& spiral = ShapeOf<SpiralElement>(alone, 0);
+  const MadeAxis made = Drive();
+  const auto states = made.States({80.0, 140.0});
+  const double first = made.Heading(states[0]);
+  const double last = made.Heading(states[1]);
+  const Eigen::Vector2d chord = spiral.end - spiral.start;
+  const double along =
+      (chord.x() * std::sin(last) - chord.y() * std::cos(last)) / std::sin(last - first);
+  alone.plan[0].stated.intersection =
+      spiral.start + along * Eigen::Vector2d(std::cos(first), std::sin(first));
+  alone.plan[0].stated.start_chainage_m.reset();
+  EXPECT_TRUE(Inspect(alone).empty());
+  spiral.turning = Turning::kLeft;
+  EXPECT_NE(Find(Inspect(alone), AxisRemarkCode::kTurningMirrored), nullptr);
+  spiral.turning = Turning::kRight;
+  std::swap(spiral.curvature_start_per_m, spiral.curvature_end_per_m);
+  EXPECT_NE(Find(Inspect(alone), AxisRemarkCode::kRadiiSwapped), nullptr);
+  alone.plan = {drive.plan[kCurve]};
+  EXPECT_TRUE(Inspect(alone).size() == 1u) << "only the chainage of its start";
+  ShapeOf<CurveElement>(alone, 0).turning = Turning::kLeft;
+  EXPECT_NE(Find(Inspect(alone), AxisRemarkCode::kTurningMirrored), nullptr);
+}
+
 TEST(Inspect, RecognisesSwappedRadiiAndEnds) {
   const AxisRemarks radii = After([](AxisDescription& d) {
     auto& spiral = ShapeOf<SpiralElement>(d, kClothoid);
@@ -246,6 +274,9 @@ TEST(Inspect, ComparesEveryRedundantValue) {
     d.stated_length_m = 700.0;
   });
   EXPECT_TRUE(right.empty());
+  const AxisRemarks square = After(
+      [](AxisDescription& d) { d.plan[kClothoid].stated.clothoid_constant_m = 60.0 * 300.0; });
+  EXPECT_TRUE(square.empty()) << "A squared is in use as well";
   const AxisRemarks whole = After([](AxisDescription& d) { d.stated_length_m = 700.1; });
   ASSERT_EQ(whole.size(), 1u);
   EXPECT_EQ(whole[0].quantity, StatedQuantity::kAlignmentLength);

@@ -185,6 +185,22 @@ TEST(AxisFile, TakesHeightsCantAndEquationsInTheUnitsOfTheFile) {
   EXPECT_EQ(axis.At({10655.0})->official, (OfficialChainage{10685.0, 2}));
 }
 
+TEST(AxisFile, AdverseCantTurnsRoundAndEquationsMayStandInAnyOrder) {
+  std::string text = Replaced(Example(),
+                              "appliedCant=\"80\" curvature=\"ccw\"",
+                              "appliedCant=\"80\" curvature=\"ccw\" adverse=\"true\"");
+  const std::size_t first = text.find("      <StaEquation");
+  const std::size_t second = text.find("      <StaEquation", first + 1);
+  const std::size_t end = text.find("      <CoordGeom>");
+  text = text.substr(0, first) + text.substr(second, end - second) +
+         text.substr(first, second - first) + text.substr(end);
+  const DesignAxis axis = Built(Loaded(text));
+  EXPECT_NEAR(axis.At({10540.0})->cant->left_over_right_m, 0.080, 1e-12);
+  EXPECT_NEAR(axis.At({10640.0})->cant->left_over_right_m, -0.080, 1e-12);
+  EXPECT_EQ(axis.At({10310.0})->official, (OfficialChainage{10360.0, 1}));
+  EXPECT_EQ(axis.At({10655.0})->official, (OfficialChainage{10685.0, 2}));
+}
+
 // Northing and easting, metres and feet, degrees and grads: the same axis.
 std::string InFeet(const std::string& xml, double metres_per_foot) {
   std::string out;
@@ -260,6 +276,7 @@ TEST(AxisFile, EveryFormOfAngleIsHonoured) {
   EXPECT_TRUE(with("grads", "33.3333333333").empty());
   EXPECT_TRUE(with("decimal dd.mm.ss", "29.5960").empty()) << "29 degrees 59 minutes 60 seconds";
   EXPECT_TRUE(with("decimal dd.mm.ss", "30.00").empty());
+  EXPECT_TRUE(with("decimal dd.mm.ss", "-330.0000").empty());
   EXPECT_EQ(with("decimal dd.mm.ss", "30.3000").size(), 1u) << "30 degrees 30 minutes";
   EXPECT_EQ(with("grads", "30.0").size(), 1u);
 }
