@@ -28,7 +28,8 @@ std::string Official(const OfficialChainage& official) {
 }
 
 std::string SummaryText(const DesignAxis& axis) {
-  std::string text = fmt::format("axis       {}\nsha256     {}\n", axis.name(), axis.file_sha256());
+  std::string text =
+      fmt::format("axis       {}\nsha256     {}\n", Quoted(axis.name()), axis.file_sha256());
   const auto line = [&](std::string_view what, InternalChainage from, InternalChainage to) {
     text += fmt::format("{:<10} {:.3f} .. {:.3f}, on the wall {} .. {}\n",
                         what,
@@ -220,6 +221,17 @@ constexpr std::string_view kProjectHeader =
     "point,status,reason,chainage_m,official_m,official_section,deviation_right_mm,deviation_up_mm,"
     "bearing_deg,gradient_mm_per_m,other_chainage_m,axis_sha256\n";
 
+// A name as a field: in quotes when it would not be one otherwise.
+std::string CsvField(std::string_view text) {
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
+  std::string field = "\"";
+  for (const char c : text) {
+    field += c;
+    if (c == '"') field += c;
+  }
+  return field + "\"";
+}
+
 std::string ProjectRow(std::string_view name,
                        const Result<AxisPosition, AxisFailure>& position,
                        const DesignAxis& axis) {
@@ -266,7 +278,7 @@ Result<std::string, FileFault> ProjectTable(const CsvTable& table,
       hint = InternalChainage{*near};
     }
     const std::string name =
-        name_column ? std::string(table.Field(row, *name_column)) : fmt::format("{}", row + 1);
+        name_column ? CsvField(table.Field(row, *name_column)) : fmt::format("{}", row + 1);
     text += ProjectRow(name, axis.Project(p_in_site, hint, request.reach_m), axis);
   }
   return text;
@@ -301,7 +313,8 @@ ExitCode RunAxisCheck(const AxisCheckRequest& request, const Console& console) {
     json["warnings"] = nlohmann::json::array();
     for (const AxisFileFault& warning : loaded->warnings)
       json["warnings"].push_back(warning.Text());
-    console.out << json.dump(2) << "\n";
+    // Names in a file may be bytes that are no UTF-8.
+    console.out << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
   } else {
     if (axis) console.out << SummaryText(*axis);
     for (const AxisFileFault& warning : loaded->warnings) {

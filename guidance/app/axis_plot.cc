@@ -80,13 +80,23 @@ std::string EquationMarks(const DesignAxis& axis) {
   return script;
 }
 
+// A name out of a file, inside a quoted string of the script: it must not end it.
+std::string Title(const std::string& name) {
+  std::string title;
+  for (const char c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    title += byte < 0x20 || byte == 0x7f || c == '\'' || c == '\\' ? '?' : c;
+  }
+  return title.empty() ? "axis" : title;
+}
+
 std::string PlotScript(const DesignAxis& axis) {
   std::string script = DataBlock(axis) + JointBlock(axis);
   script += fmt::format(
       "set multiplot title '{}   {:.8}..'\nset grid\nset key above right horizontal\nset lmargin "
       "12\n"
       "set rmargin 12\n",
-      axis.name().empty() ? "axis" : axis.name(),
+      Title(axis.name()),
       axis.file_sha256());
   script +=
       "set origin 0,0.52\nset size 1,0.44\nset size ratio -1\nset xlabel 'east m'\n"

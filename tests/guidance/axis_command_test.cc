@@ -1,6 +1,7 @@
 #include "guidance/app/axis_command.h"
 
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <sstream>
 #include <string>
@@ -205,6 +206,33 @@ TEST(AxisCommand, ComplainsOfEveryFaultOfTheFile) {
   EXPECT_THAT(outcome.err, HasSubstr(":11: "));
   EXPECT_THAT(outcome.err, HasSubstr("names a family"));
   EXPECT_EQ(outcome.out, "");
+}
+
+// Names come from files: they are text, not commands, and need not be UTF-8.
+TEST(AxisCommand, NamesAreOnlyText) {
+  const TempFolder folder;
+  std::string text = ReadText(kFolder + "example.xml");
+  const std::string name = "name=\"north tube\"";
+  text.replace(text.find(name),
+               name.size(),
+               "name=\"n\xFC' \nsystem 'touch " + (folder / "harm") + "' &#10;\x1b[31m\"");
+  WriteText(folder / "axis.xml", text);
+  const AxisSource source{folder / "axis.xml", {}};
+  auto check = For<AxisCheckRequest>(source);
+  const Outcome shown = Ran(RunAxisCheck, check);
+  EXPECT_EQ(shown.code, ExitCode::kDone);
+  EXPECT_EQ(shown.out.find('\x1b'), std::string::npos);
+  check.as_json = true;
+  EXPECT_EQ(nlohmann::json::parse(Ran(RunAxisCheck, check).out)["usable"], true);
+  auto plot = For<AxisPlotRequest>(source);
+  plot.out = folder / "axis.png";
+  EXPECT_EQ(Ran(RunAxisPlot, plot).code, ExitCode::kDone);
+  EXPECT_FALSE(std::filesystem::exists(folder / "harm"));
+  WriteText(folder / "points.csv",
+            "point,east_m,north_m,up_m\n\"ring 1, left\",4519.5,12098.0,411.7\n");
+  auto project = For<AxisProjectRequest>(source);
+  project.points = folder / "points.csv";
+  EXPECT_THAT(Ran(RunAxisProject, project).out, HasSubstr("\n\"ring 1, left\",ok,,10012."));
 }
 
 TEST(AxisCommand, PlotDrawsAPicture) {

@@ -281,6 +281,27 @@ TEST(AxisFile, EveryFormOfAngleIsHonoured) {
   EXPECT_EQ(with("grads", "30.0").size(), 1u);
 }
 
+TEST(AxisFile, PointsOfAnElementMayStandInAnyOrder) {
+  std::string text = Example();
+  const DesignAxis axis = Built(Loaded(text));
+  int moved = 0;
+  // Start becomes the last child of every element that has more than two.
+  for (std::size_t at = 0; (at = text.find("\n          <Start>", at)) != std::string::npos;
+       ++moved) {
+    const std::size_t begin = text.find("<Start>", at);
+    const std::size_t end = text.find("</Start>", at) + 8;
+    const std::string start = text.substr(begin, end - begin);
+    const std::size_t last = text.find("</End>", end) + 6;
+    text = text.substr(0, begin) + text.substr(end, last - end) + start + text.substr(last);
+    at = last;
+  }
+  EXPECT_EQ(moved, 6);
+  const DesignAxis other = Built(Loaded(text));
+  for (double chainage_m = 10000.0; chainage_m <= 10800.0; chainage_m += 50.0) {
+    EXPECT_EQ(axis.At({chainage_m})->p_plan_in_site, other.At({chainage_m})->p_plan_in_site);
+  }
+}
+
 TEST(AxisFile, SubtractsTheOriginOfTheSite) {
   AxisFileOptions options;
   options.site_origin = {4000.0, 12000.0, 400.0};
