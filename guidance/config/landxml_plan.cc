@@ -217,9 +217,12 @@ PlanElement LandXmlPlanReader::ReadSpiral(const XmlElement& element) const {
     element.FaultAt("length", fmt::format("{} is not more than 0", *length));
   }
   spiral.length_m = length.value_or(0.0) * units_.length_m;
+  // Some writers have no INF and state a radius beyond all tunnels: the same to a micrometre.
+  constexpr double kStraight_m = 1e12;
   const auto curvature = [&](std::string_view attribute) {
     const auto radius = element.RequiredRadius(attribute);
-    return radius && std::isfinite(*radius) ? 1.0 / (*radius * units_.length_m) : 0.0;
+    const double radius_m = radius.value_or(kStraight_m) * units_.length_m;
+    return std::abs(radius_m) < kStraight_m ? 1.0 / radius_m : 0.0;
   };
   spiral.curvature_start_per_m = curvature("radiusStart");
   spiral.curvature_end_per_m = curvature("radiusEnd");

@@ -281,6 +281,13 @@ TEST(AxisFile, EveryFormOfAngleIsHonoured) {
   EXPECT_EQ(with("grads", "30.0").size(), 1u);
 }
 
+TEST(AxisFile, ARadiusBeyondAllTunnelsIsStraight) {
+  const std::string xml =
+      ReadText(TBM_SOURCE_DIR "/tests/fuzz/seeds/axis_file_fuzz/japaneseCubic.xml");
+  const DesignAxis axis = Built(Loaded(Replaced(xml, "INF", "1e38")));
+  EXPECT_EQ(axis.At({50.0})->p_plan_in_site, Built(Loaded(xml)).At({50.0})->p_plan_in_site);
+}
+
 TEST(AxisFile, PointsOfAnElementMayStandInAnyOrder) {
   std::string text = Example();
   const DesignAxis axis = Built(Loaded(text));
