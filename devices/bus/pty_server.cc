@@ -9,7 +9,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <pty.h>
-#include <sys/eventfd.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -31,58 +30,25 @@ std::optional<PtyOutbox::SteadyTime> PtyOutbox::NextDue() const {
 
 PtyServer::PtyServer(std::string link_path, PtyInstrument& instrument)
     : link_path_(std::move(link_path)), instrument_(instrument) {
-  wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return settled_; });
+  plug_.WaitSettled();
 }
 
 PtyServer::~PtyServer() {
   thread_.request_stop();
-  Wake();
+  plug_.Wake();
   thread_.join();
-  close(wake_);
-}
-
-bool PtyServer::IsUp() const {
-  const std::lock_guard lock(mutex_);
-  return is_up_;
-}
-
-void PtyServer::Want(bool plugged) {
-  std::unique_lock lock(mutex_);
-  if (wanted_ == plugged) return;
-  wanted_ = plugged;
-  settled_ = false;
-  Wake();
-  changed_.wait(lock, [this] { return settled_; });
-}
-
-void PtyServer::Wake() {
-  const std::uint64_t one = 1;
-  [[maybe_unused]] const ssize_t written = write(wake_, &one, sizeof one);
-}
-
-bool PtyServer::IsWanted() {
-  const std::lock_guard lock(mutex_);
-  return wanted_;
 }
 
 void PtyServer::Run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    const bool plugged = IsWanted();
+    const bool plugged = plug_.IsWanted();
     if (plugged && master_ < 0) {
       if (!PlugIn()) PullOut();
       instrument_.OnPlug();
     }
     if (!plugged) PullOut();
-    {
-      const std::lock_guard lock(mutex_);
-      is_up_ = master_ >= 0;
-      // When the wish changed meanwhile, its wake-up is pending and the next turn settles it.
-      settled_ = wanted_ == plugged;
-    }
-    changed_.notify_all();
+    plug_.Settle(plugged, master_ >= 0);
     Serve(stop);
   }
   PullOut();
@@ -103,20 +69,8 @@ void PtyServer::Serve(const std::stop_token& stop) {
       }
       if (const auto due = outbox_.NextDue()) wake = wake ? std::min(*wake, *due) : due;
     }
-    timespec wait{};
-    if (wake) {
-      const auto left = std::max(*wake - now, steady_clock::duration::zero());
-      const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(left);
-      wait.tv_sec = static_cast<time_t>(seconds.count());
-      wait.tv_nsec = static_cast<long>(std::chrono::nanoseconds(left - seconds).count());
-    }
-    std::array<pollfd, 2> entries{{{wake_, POLLIN, 0}, {master_, POLLIN, 0}}};
-    ppoll(entries.data(), plugged ? 2 : 1, wake ? &wait : nullptr, nullptr);
-    if ((entries[0].revents & POLLIN) != 0) {
-      std::uint64_t count = 0;
-      [[maybe_unused]] const ssize_t taken = read(wake_, &count, sizeof count);
-      return;
-    }
+    std::array<pollfd, 2> entries{{{}, {plugged ? master_ : -1, POLLIN, 0}}};
+    if (plug_.Sleep(entries, wake)) return;
     if (plugged && (entries[1].revents & POLLIN) != 0) {
       const ssize_t count = read(master_, bytes.data(), bytes.size());
       now = steady_clock::now();

@@ -1,16 +1,16 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include "devices/bus/plug_switch.h"
 
 namespace tbm {
 
@@ -62,35 +62,26 @@ class PtyServer {
   PtyServer(const PtyServer&) = delete;
   PtyServer& operator=(const PtyServer&) = delete;
 
-  bool IsUp() const;
+  bool IsUp() const { return plug_.IsUp(); }
   const std::string& path() const { return link_path_; }
 
   // Pulls the adapter out: the client's port hangs up and its name vanishes. Replug brings a new
   // terminal under the same name. Both return when it is done.
-  void Unplug() { Want(false); }
-  void Replug() { Want(true); }
+  void Unplug() { plug_.Want(false); }
+  void Replug() { plug_.Want(true); }
 
  private:
-  void Want(bool plugged);
   void Run(const std::stop_token& stop);
   void Serve(const std::stop_token& stop);
   bool PlugIn();
   void PullOut();
-  void Wake();
-  bool IsWanted();
 
   const std::string link_path_;
   PtyInstrument& instrument_;
   PtyOutbox outbox_;
   int master_ = -1;
   int slave_ = -1;
-  int wake_ = -1;
-
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  bool wanted_ = true;
-  bool settled_ = false;
-  bool is_up_ = false;
+  PlugSwitch plug_;
   std::jthread thread_;  // last: it uses all of the above
 };
 

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <ctime>
 
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
-#include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -20,22 +18,14 @@ using std::chrono::steady_clock;
 
 TcpServer::TcpServer(std::string address, int port, PtyInstrument& instrument)
     : address_(std::move(address)), instrument_(instrument), port_(port) {
-  wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return settled_; });
+  plug_.WaitSettled();
 }
 
 TcpServer::~TcpServer() {
   thread_.request_stop();
-  Wake();
+  plug_.Wake();
   thread_.join();
-  close(wake_);
-}
-
-bool TcpServer::IsUp() const {
-  const std::lock_guard lock(mutex_);
-  return is_up_;
 }
 
 int TcpServer::port() const {
@@ -43,39 +33,16 @@ int TcpServer::port() const {
   return port_;
 }
 
-void TcpServer::Want(bool plugged) {
-  std::unique_lock lock(mutex_);
-  if (wanted_ == plugged) return;
-  wanted_ = plugged;
-  settled_ = false;
-  Wake();
-  changed_.wait(lock, [this] { return settled_; });
-}
-
-void TcpServer::Wake() {
-  const std::uint64_t one = 1;
-  [[maybe_unused]] const ssize_t written = write(wake_, &one, sizeof one);
-}
-
 void TcpServer::Run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    bool plugged = false;
-    {
-      const std::lock_guard lock(mutex_);
-      plugged = wanted_;
-    }
+    const bool plugged = plug_.IsWanted();
     if (plugged && listener_ < 0) Listen();
     if (!plugged) {
       DropClient();
       if (listener_ >= 0) close(listener_);
       listener_ = -1;
     }
-    {
-      const std::lock_guard lock(mutex_);
-      is_up_ = listener_ >= 0;
-      settled_ = wanted_ == plugged;
-    }
-    changed_.notify_all();
+    plug_.Settle(plugged, listener_ >= 0);
     Serve(stop);
   }
   DropClient();
@@ -109,22 +76,8 @@ void TcpServer::Listen() {
 void TcpServer::Serve(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     const auto wake = listener_ >= 0 ? Talk() : std::nullopt;
-    timespec wait{};
-    if (wake) {
-      const auto left = std::max(*wake - steady_clock::now(), steady_clock::duration::zero());
-      const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(left);
-      wait.tv_sec = static_cast<time_t>(seconds.count());
-      wait.tv_nsec = static_cast<long>(std::chrono::nanoseconds(left - seconds).count());
-    }
-    // A negative descriptor is passed over.
-    std::array<pollfd, 3> entries{
-        {{wake_, POLLIN, 0}, {listener_, POLLIN, 0}, {client_, POLLIN, 0}}};
-    ppoll(entries.data(), entries.size(), wake ? &wait : nullptr, nullptr);
-    if ((entries[0].revents & POLLIN) != 0) {
-      std::uint64_t count = 0;
-      [[maybe_unused]] const ssize_t taken = read(wake_, &count, sizeof count);
-      return;
-    }
+    std::array<pollfd, 3> entries{{{}, {listener_, POLLIN, 0}, {client_, POLLIN, 0}}};
+    if (plug_.Sleep(entries, wake)) return;
     if (client_ >= 0 && entries[2].revents != 0) Receive();
     if (listener_ >= 0 && (entries[1].revents & POLLIN) != 0) Accept();
   }

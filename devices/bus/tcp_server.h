@@ -1,11 +1,11 @@
 #pragma once
 
-#include <condition_variable>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 
+#include "devices/bus/plug_switch.h"
 #include "devices/bus/pty_server.h"
 
 namespace tbm {
@@ -21,16 +21,15 @@ class TcpServer {
   TcpServer(const TcpServer&) = delete;
   TcpServer& operator=(const TcpServer&) = delete;
 
-  bool IsUp() const;
+  bool IsUp() const { return plug_.IsUp(); }
   int port() const;
 
   // Closes the port and the client's connection, and opens the port again, the same one. Both
   // return when it is done.
-  void Unplug() { Want(false); }
-  void Replug() { Want(true); }
+  void Unplug() { plug_.Want(false); }
+  void Replug() { plug_.Want(true); }
 
  private:
-  void Want(bool plugged);
   void Run(const std::stop_token& stop);
   void Serve(const std::stop_token& stop);
   std::optional<PtyOutbox::SteadyTime> Talk();
@@ -38,21 +37,16 @@ class TcpServer {
   void Accept();
   void Receive();
   void DropClient();
-  void Wake();
 
   const std::string address_;
   PtyInstrument& instrument_;
   PtyOutbox outbox_;
   int listener_ = -1;
   int client_ = -1;
-  int wake_ = -1;
+  PlugSwitch plug_;
 
   mutable std::mutex mutex_;
-  std::condition_variable changed_;
   int port_;
-  bool wanted_ = true;
-  bool settled_ = false;
-  bool is_up_ = false;
   std::jthread thread_;  // last: it uses all of the above
 };
 
