@@ -34,7 +34,7 @@ install(FILES ${package_dir}/box/serial.rules
 set(package_components camera_box)
 if(NOT CMAKE_CROSSCOMPILING)
   list(APPEND package_components tools)
-  install(TARGETS tbm tbm_sim camera_sim RUNTIME DESTINATION bin COMPONENT tools)
+  install(TARGETS tbm tbm_sim camera_sim total_station_sim RUNTIME DESTINATION bin COMPONENT tools)
   install(FILES ${PROJECT_SOURCE_DIR}/README.md DESTINATION share/doc/tbm-tools COMPONENT tools)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/pose/app/example
     DESTINATION share/doc/tbm-tools COMPONENT tools)
@@ -100,6 +100,8 @@ set(tools_depends
   "libgoogle-glog0v6 (>= 0.6.0)"
   "liblapack3 | liblapack.so.3"
   "libpng16-16 (>= 1.6.39)"
+  "libpugixml1v5 (>= 1.13)"
+  "libssl3 (>= 3.0.0)"
   "libstdc++6 (>= 12)"
   "libtiff6 (>= 4.5.0)"
   "libyaml-cpp0.7 (>= 0.7.0)")
