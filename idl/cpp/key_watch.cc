@@ -53,8 +53,14 @@ void KeyWatch::FallSilent(Key& key, const std::string& why) {
   raise_(AlarmKind::kSilent, true, fmt::format("{} {}", key.name, why));
 }
 
-void KeyWatch::Missed(const Id& key, const std::string& why) {
+void KeyWatch::Left(const Id& key, const std::string& why) {
   if (Key* known = Find(key)) FallSilent(*known, why);
+}
+
+void KeyWatch::MissedDeadline(const Id& key, Instant now) {
+  Key* known = Find(key);
+  if (known == nullptr || now - known->heard_at < silent_after_ * 9 / 10) return;
+  FallSilent(*known, "has missed its deadline");
 }
 
 void KeyWatch::Matched(int writers, Instant now) {

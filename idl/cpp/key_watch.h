@@ -35,8 +35,13 @@ class KeyWatch {
     return known != nullptr && Heard(*known, writer, now);
   }
 
-  // DDS says that the key has missed its deadline, or that its writers have left.
-  void Missed(const Id& key, const std::string& why);
+  // DDS says that the key's writers have left.
+  void Left(const Id& key, const std::string& why);
+
+  // DDS says that the key has missed its deadline. Its timer runs for all keys of a reader, and one
+  // that goes off while a new key's first sample comes in is laid at that key's door: believed only
+  // when nothing was heard for nine tenths of the time. Poll finds the rest.
+  void MissedDeadline(const Id& key, Instant now);
 
   // How many writers are matched: one that never sends anything is silence too.
   void Matched(int writers, Instant now);

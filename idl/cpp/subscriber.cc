@@ -138,7 +138,8 @@ class Subscriber<Message>::Impl final : public Endpoint, private fdds::DataReade
       if (info.valid_data) {
         Receive(info);
       } else {
-        Missed(info.instance_handle, "has no writer any more");
+        const std::lock_guard watching(watch_mutex_);
+        watch_.Left(IdOf(info.instance_handle), "has no writer any more");
       }
     }
   }
@@ -215,11 +216,6 @@ class Subscriber<Message>::Impl final : public Endpoint, private fdds::DataReade
     }
   }
 
-  void Missed(const rtps::InstanceHandle_t& key, const std::string& why) {
-    const std::lock_guard lock(watch_mutex_);
-    watch_.Missed(IdOf(key), why);
-  }
-
   void on_subscription_matched(fdds::DataReader*,
                                const fdds::SubscriptionMatchedStatus& status) override {
     matched_ = status.current_count;
@@ -228,7 +224,8 @@ class Subscriber<Message>::Impl final : public Endpoint, private fdds::DataReade
   }
   void on_requested_deadline_missed(
       fdds::DataReader*, const eprosima::fastrtps::RequestedDeadlineMissedStatus& status) override {
-    Missed(status.last_instance_handle, "has missed its deadline");
+    const std::lock_guard lock(watch_mutex_);
+    watch_.MissedDeadline(IdOf(status.last_instance_handle), std::chrono::steady_clock::now());
   }
   void on_requested_incompatible_qos(fdds::DataReader*,
                                      const fdds::RequestedIncompatibleQosStatus& status) override {

@@ -43,6 +43,21 @@ TEST_F(KeyWatchTest, SaysOnceThatAKeyIsSilentAndOnceThatItIsBack) {
   EXPECT_EQ(Raised(AlarmKind::kSilent, false), 1);
 }
 
+// Seen 2026-11: DDS' timer, begun with the reader, went off as the first sample of a key came in.
+TEST_F(KeyWatchTest, DoesNotBelieveADeadlineOfAKeyThatWasJustHeard) {
+  Hear(1, 1);
+  watch_.MissedDeadline(Number(1), now_ + 100ms);
+  EXPECT_EQ(Raised(AlarmKind::kSilent), 0);
+  watch_.MissedDeadline(Number(1), now_ + 500ms);
+  EXPECT_EQ(Raised(AlarmKind::kSilent), 1);
+}
+
+TEST_F(KeyWatchTest, BelievesAtOnceThatTheWritersHaveLeft) {
+  Hear(1, 1);
+  watch_.Left(Number(1), "has no writer any more");
+  EXPECT_EQ(Raised(AlarmKind::kSilent), 1);
+}
+
 TEST_F(KeyWatchTest, WatchesEachKeyForItself) {
   Hear(1, 1);
   Hear(2, 1);
