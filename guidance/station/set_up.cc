@@ -348,6 +348,20 @@ Result<SetUp, SetUpFailure> Problem::Solve(std::optional<int> left_out) const {
   return set_up;
 }
 
+bool IsFinite(const Reference& reference) {
+  return reference.p_in_site.allFinite() && reference.sigma_m >= 0.0 &&
+         std::isfinite(reference.sigma_m);
+}
+
+bool IsFinite(const ReferenceSighting& sighting) {
+  const PolarReading& reading = sighting.reading;
+  const PolarSigma& sigma = sighting.sigma;
+  const auto is_sigma = [](double value) { return value > 0.0 && std::isfinite(value); };
+  return std::isfinite(reading.circle_rad) && std::isfinite(reading.zenith_rad) &&
+         is_sigma(sigma.circle_rad) && is_sigma(sigma.zenith_rad) &&
+         (!reading.slope_m || (std::isfinite(*reading.slope_m) && is_sigma(sigma.slope_m)));
+}
+
 bool Agrees(const SetUp& set_up, double gate_risk) {
   return set_up.dof == 0 || ChiSquaredTail(set_up.chi2, set_up.dof) >= gate_risk;
 }
@@ -361,6 +375,10 @@ Result<SetUp, SetUpFailure> SolveSetUp(std::span<const Reference> references,
   for (const ReferenceSighting& sighting : sightings) {
     if (sighting.reference < 0 || sighting.reference >= static_cast<int>(references.size())) {
       return Failure{SetUpFailure::kNoSuchReference};
+    }
+    if (!IsFinite(sighting) ||
+        !IsFinite(references[static_cast<std::size_t>(sighting.reference)])) {
+      return Failure{SetUpFailure::kNotFinite};
     }
   }
   const Problem problem(references, sightings, prior, options);

@@ -36,6 +36,7 @@ struct StationPrior {
 
 enum class SetUpFailure {
   kNoSuchReference,  // a sighting's index
+  kNotFinite,        // a reading, a sigma or a reference that is no number, or a sigma of zero
   kTooFewSightings,  // fewer values than unknowns
   kNoStart,          // a free station needs distances to two references a metre apart in plan
   kWeakGeometry,     // a coordinate or the orientation is left without a usable sigma

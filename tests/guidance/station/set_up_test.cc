@@ -197,6 +197,33 @@ TEST(SetUp, RefusesWhatCannotBeSolved) {
             SetUpFailure::kWeakGeometry);
 }
 
+// Else the one that is no number would be "left out" like a prism that moved.
+TEST(SetUp, WhatIsNoNumberIsRefusedAndNotLeftOut) {
+  Random random("set_up_not_finite");
+  const Draw good = DrawSightings(Wall(5), random, 1);
+  const auto refused = [](const Draw& draw) {
+    const auto set_up = SolveSetUp(draw.references, draw.sightings, {}, Options());
+    return !set_up && set_up.error() == SetUpFailure::kNotFinite;
+  };
+  const double nan = std::nan("");
+  Draw draw = good;
+  draw.sightings[2].reading.zenith_rad = nan;
+  EXPECT_TRUE(refused(draw));
+  draw = good;
+  draw.sightings[2].reading.slope_m = nan;
+  EXPECT_TRUE(refused(draw));
+  draw = good;
+  draw.sightings[2].sigma.circle_rad = 0.0;
+  EXPECT_TRUE(refused(draw));
+  draw = good;
+  draw.references[2].p_in_site.x() = nan;
+  EXPECT_TRUE(refused(draw));
+  draw = good;
+  draw.references[2].sigma_m = -0.001;
+  EXPECT_TRUE(refused(draw));
+  EXPECT_FALSE(refused(good));
+}
+
 TEST(SetUp, WhatNothingChecksSaysSo) {
   Random random("set_up_unchecked");
   const Draw draw = DrawSightings(Wall(1), random, 1);
