@@ -84,8 +84,8 @@ struct FrameAngles {
 };
 
 // Three fields; the layout is told by the number of data bytes:
-//   9 = 3 + 3 + 3  SXXX.YY                     12 = 4 + 4 + 4  SDDD.DDDD
-//  11 = 4 + 4 + 3  SDDD.DDDD twice, SXXX.YY    (S: 0 plus, 1 minus; everything else decimal digits)
+//   9 = 3 + 3 + 3  SDDD.DD                     12 = 4 + 4 + 4  SDDD.DDDD
+//  11 = 4 + 4 + 3  SDDD.DDDD twice, SDDD.DD    (S: 0 plus, 1 minus; everything else decimal digits)
 Result<FrameAngles, AngleFailure> DecodeAngles(FrameFamily family, const BcdFrame& frame);
 
 enum class FrameLayout { kThreeByte, kFourByteTemperature, kFourByte };

@@ -12,17 +12,6 @@ constexpr double kLargestCantShare = 1.0 / 3.0;
 // Steepest twist; railways stop at 1 in 400.
 constexpr double kSteepestTwist = 1.0 / 50.0;
 
-AxisRemark RemarkAt(
-    AxisRemarkCode code, Severity severity, int line, InternalChainage at, double size) {
-  AxisRemark remark;
-  remark.code = code;
-  remark.severity = severity;
-  remark.line = line;
-  remark.at = at;
-  remark.size = size;
-  return remark;
-}
-
 // A table's heights belong to its points, whose chainages the plan has counted.
 Profile ProfileOfTable(const AxisDescription& description, const Plan& plan) {
   std::vector<double> chainages_m;

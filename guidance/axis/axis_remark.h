@@ -93,6 +93,17 @@ struct AxisRemark {
 };
 using AxisRemarks = std::vector<AxisRemark>;
 
+inline AxisRemark RemarkAt(
+    AxisRemarkCode code, Severity severity, int line, InternalChainage at, double size) {
+  AxisRemark remark;
+  remark.code = code;
+  remark.severity = severity;
+  remark.line = line;
+  remark.at = at;
+  remark.size = size;
+  return remark;
+}
+
 bool IsRefused(const AxisRemarks& remarks);
 
 // Limits, each the smallest that real files need.

@@ -52,13 +52,7 @@ class Comparison {
 
  private:
   AxisRemark& Say(AxisRemarkCode code, Severity severity, double size) {
-    AxisRemark remark;
-    remark.code = code;
-    remark.severity = severity;
-    remark.line = element_.line;
-    remark.at = at_;
-    remark.size = size;
-    remarks_.push_back(remark);
+    remarks_.push_back(RemarkAt(code, severity, element_.line, at_, size));
     return remarks_.back();
   }
   void SayDisagrees(StatedQuantity quantity, double stated, double computed, Severity severity) {

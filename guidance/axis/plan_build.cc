@@ -52,13 +52,7 @@ class Builder {
                   const PlanElement& element,
                   InternalChainage at,
                   double size) {
-    AxisRemark remark;
-    remark.code = code;
-    remark.severity = severity;
-    remark.line = element.line;
-    remark.at = at;
-    remark.size = size;
-    remarks_.push_back(remark);
+    remarks_.push_back(RemarkAt(code, severity, element.line, at, size));
     return remarks_.back();
   }
 

@@ -47,13 +47,7 @@ class Solver {
     return std::nullopt;
   }
   void Say(AxisRemarkCode code, Severity severity, double size) {
-    AxisRemark remark;
-    remark.code = code;
-    remark.severity = severity;
-    remark.line = element_.line;
-    remark.at = at_;
-    remark.size = size;
-    remarks_.push_back(remark);
+    remarks_.push_back(RemarkAt(code, severity, element_.line, at_, size));
   }
   // True when the size is refused.
   bool SayDistance(AxisRemarkCode code, double size_m) {
@@ -113,17 +107,14 @@ class Solver {
     const double bend = chord_m * chord_m / (8.0 * radius_m * radius_m);
     const double off_m = std::min(bend, 1.0) * std::abs(stated_m - radius_m);
     if (off_m <= kGapOddAbove_m) return true;
-    AxisRemark remark;
-    remark.code = AxisRemarkCode::kValueDisagrees;
+    const Severity severity = off_m <= kGapRefusedAbove_m ? Severity::kOdd : Severity::kRefused;
+    AxisRemark remark =
+        RemarkAt(AxisRemarkCode::kValueDisagrees, severity, element_.line, at_, off_m);
     remark.quantity = StatedQuantity::kRadius;
-    remark.severity = off_m <= kGapRefusedAbove_m ? Severity::kOdd : Severity::kRefused;
-    remark.line = element_.line;
-    remark.at = at_;
-    remark.size = off_m;
     remark.stated = stated_m;
     remark.computed = radius_m;
     remarks_.push_back(remark);
-    return remark.severity == Severity::kOdd;
+    return severity == Severity::kOdd;
   }
 
   bool HeightFromRadius(const CurveElement& curve,

@@ -89,13 +89,9 @@ class TableBuilder {
 
  private:
   AxisRemark& Say(AxisRemarkCode code, Severity severity, std::size_t point, double size) {
-    AxisRemark remark;
-    remark.code = code;
-    remark.severity = severity;
-    if (point < table_.size()) remark.line = table_[point].line;
-    if (point < chainages_m_.size()) remark.at = {chainages_m_[point]};
-    remark.size = size;
-    remarks_.push_back(remark);
+    const int line = point < table_.size() ? table_[point].line : 0;
+    const double at_m = point < chainages_m_.size() ? chainages_m_[point] : 0.0;
+    remarks_.push_back(RemarkAt(code, severity, line, {at_m}, size));
     return remarks_.back();
   }
 

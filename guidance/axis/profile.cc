@@ -31,13 +31,7 @@ AxisRemark Remark(AxisRemarkCode code,
                   Severity severity,
                   const ProfileElement& element,
                   double size) {
-  AxisRemark remark;
-  remark.code = code;
-  remark.severity = severity;
-  remark.line = element.line;
-  remark.at = element.at;
-  remark.size = size;
-  return remark;
+  return RemarkAt(code, severity, element.line, element.at, size);
 }
 
 bool IsFinite(const ProfileElement& e) {

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "devices/total_station/geocom_emulator.h"
+#include "devices/total_station/geocom_fault.h"
 
 namespace tbm::test {
 
@@ -42,5 +43,18 @@ inline TrueSight SightOf(const Eigen::Vector3d& p_in_site, double circle_zero_be
   while (circle_rad < 0) circle_rad += 2 * std::numbers::pi;
   return {{circle_rad, std::acos(way.z() / way.norm())}, way.norm()};
 }
+
+// All that can happen to a line on its way, or to the connection.
+inline constexpr GeocomFaultKind kLineFaults[] = {GeocomFaultKind::kLate,
+                                                  GeocomFaultKind::kLostReply,
+                                                  GeocomFaultKind::kLostRequest,
+                                                  GeocomFaultKind::kMissingValues,
+                                                  GeocomFaultKind::kGarbageBefore,
+                                                  GeocomFaultKind::kBitError,
+                                                  GeocomFaultKind::kLostFirst,
+                                                  GeocomFaultKind::kSplit,
+                                                  GeocomFaultKind::kGlued,
+                                                  GeocomFaultKind::kTwice,
+                                                  GeocomFaultKind::kCloses};
 
 }  // namespace tbm::test

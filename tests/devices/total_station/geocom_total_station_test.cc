@@ -190,21 +190,9 @@ TEST_F(Geocom, TellsIdentityPowerAndTemperature) {
   EXPECT_EQ(station_->Health().identity, *identity);
 }
 
-constexpr GeocomFaultKind kLineFaults[] = {GeocomFaultKind::kLate,
-                                           GeocomFaultKind::kLostReply,
-                                           GeocomFaultKind::kLostRequest,
-                                           GeocomFaultKind::kMissingValues,
-                                           GeocomFaultKind::kGarbageBefore,
-                                           GeocomFaultKind::kBitError,
-                                           GeocomFaultKind::kLostFirst,
-                                           GeocomFaultKind::kSplit,
-                                           GeocomFaultKind::kGlued,
-                                           GeocomFaultKind::kTwice,
-                                           GeocomFaultKind::kCloses};
-
 // The telescope is elsewhere at each reading, so any answer but the newest is a wrong one.
 TEST_F(Geocom, NoFaultOfTheLineEverMakesAWrongValue) {
-  for (const GeocomFaultKind kind : kLineFaults) {
+  for (const GeocomFaultKind kind : test::kLineFaults) {
     Start();
     ASSERT_TRUE(Connect());
     // Setting up a connection takes ten calls: it must have a chance to succeed.
@@ -232,7 +220,7 @@ TEST_F(Geocom, NoFaultOfTheLineEverMakesAWrongValue) {
 // The whole cycle of a process, on a line where every seventh call goes wrong: whenever turning and
 // measuring both say that all is well, the numbers are those of the prism that was meant.
 TEST_F(Geocom, NoFaultOfTheLineGivesOnePrismTheNumbersOfAnother) {
-  for (const GeocomFaultKind kind : kLineFaults) {
+  for (const GeocomFaultKind kind : test::kLineFaults) {
     Start();
     ASSERT_TRUE(Connect());
     const double ratio = kind == GeocomFaultKind::kCloses ? 0.05 : 0.15;

@@ -110,17 +110,7 @@ TEST_P(GeocomWire, TurnsAndMeasuresInBothFaces) {
 TEST_P(GeocomWire, NoFaultMakesAWrongValueAndEachIsOvercome) {
   ConnectWithLimits(250ms, 250ms);
   int step = 0;
-  for (const auto kind : {GeocomFaultKind::kLate,
-                          GeocomFaultKind::kLostReply,
-                          GeocomFaultKind::kLostRequest,
-                          GeocomFaultKind::kMissingValues,
-                          GeocomFaultKind::kGarbageBefore,
-                          GeocomFaultKind::kBitError,
-                          GeocomFaultKind::kLostFirst,
-                          GeocomFaultKind::kSplit,
-                          GeocomFaultKind::kGlued,
-                          GeocomFaultKind::kTwice,
-                          GeocomFaultKind::kCloses}) {
+  for (const auto kind : test::kLineFaults) {
     emulator_.faults().Add({kind, -1, 0, kind == GeocomFaultKind::kLate ? 260ms : 20ms, 0});
     for (int i = 0; i < 3; ++i) {
       const CircleReading truth{0.1 * ++step, 1.0};
