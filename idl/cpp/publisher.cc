@@ -155,5 +155,12 @@ template class Publisher<TiltReading>;
 template class Publisher<RelativePose>;
 template class Publisher<DeviceHealth>;
 template class Publisher<Event>;
+template class Publisher<StationObservation>;
+template class Publisher<StationSetUp>;
+template class Publisher<ShieldPose>;
+template class Publisher<Guidance>;
+template class Publisher<AlarmStatus>;
+template class Publisher<Command>;
+template class Publisher<CommandReply>;
 
 }  // namespace tbm::dds

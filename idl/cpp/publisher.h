@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "idl/cpp/boundary.h"
+#include "idl/cpp/guidance_messages.h"
 #include "idl/cpp/messages.h"
 #include "idl/cpp/participant.h"
 
@@ -24,8 +25,8 @@ struct PublisherCounters {
   BoundaryFault refused_because = BoundaryFault::kNone;  // the last one
 };
 
-// Writes one topic. Message is FrameFeatures, TiltReading, RelativePose, DeviceHealth or Event;
-// topic and QoS follow from it. One thread at a time writes; the others wait.
+// Writes one topic. Message is a struct of messages.h or guidance_messages.h; topic and QoS follow
+// from it. One thread at a time writes; the others wait.
 //
 // Write keeps no reference and does not wait for readers. Our own part takes no heap after the
 // first sample. Fast DDS 2.9.1 makes and drops up to ten closures of 32 bytes in each call,

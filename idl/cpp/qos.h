@@ -10,6 +10,7 @@ enum class QosClass {
   kMeasurement,  // a stream that is worth what its newest sample is worth
   kHealth,       // a standing state with a heartbeat
   kEvents,       // things that must not be missed
+  kRecord,       // single readings and requests: each counts, and none is worth anything later
 };
 
 // What a class means. The same for writer and reader, so they always match.
@@ -47,6 +48,11 @@ constexpr QosRule RuleOf(QosClass qos_class) {
     // A console that starts later sees the last eight of each kind. No deadline: no news is normal.
     case QosClass::kEvents:
       return {true, 8, 256, std::chrono::milliseconds(0)};
+    // Volatile: a command or a reading of an hour ago must not come to a process that starts now. 32
+    // deep: two rounds of readings over prisms and references. No deadline: they come when they
+    // come; that the instrument lives is said by its health.
+    case QosClass::kRecord:
+      return {false, 32, 16, std::chrono::milliseconds(0)};
   }
   return {};
 }

@@ -33,6 +33,21 @@ std::string NameOfKey(const DeviceHealth& m) {
 std::string NameOfKey(const Event& m) {
   return fmt::format("{}/{}/{}", m.machine_id.view(), m.source.view(), m.code.view());
 }
+std::string NameOfKey(const StationObservation& m) {
+  return fmt::format("{}/{}", m.machine_id.view(), m.station.view());
+}
+std::string NameOfKey(const StationSetUp& m) {
+  return fmt::format("{}/{}", m.machine_id.view(), m.role.view());
+}
+std::string NameOfKey(const ShieldPose& m) {
+  return fmt::format("{}/{}", m.machine_id.view(), m.shield.view());
+}
+std::string NameOfKey(const Guidance& m) { return std::string(m.machine_id.view()); }
+std::string NameOfKey(const AlarmStatus& m) {
+  return fmt::format("{}/{}/{}", m.machine_id.view(), m.source.view(), m.code.view());
+}
+std::string NameOfKey(const Command& m) { return std::string(m.machine_id.view()); }
+std::string NameOfKey(const CommandReply& m) { return std::string(m.machine_id.view()); }
 
 KeyWatch::Id IdOf(const rtps::InstanceHandle_t& handle) {
   KeyWatch::Id id{};
@@ -298,5 +313,12 @@ template class Subscriber<TiltReading>;
 template class Subscriber<RelativePose>;
 template class Subscriber<DeviceHealth>;
 template class Subscriber<Event>;
+template class Subscriber<StationObservation>;
+template class Subscriber<StationSetUp>;
+template class Subscriber<ShieldPose>;
+template class Subscriber<Guidance>;
+template class Subscriber<AlarmStatus>;
+template class Subscriber<Command>;
+template class Subscriber<CommandReply>;
 
 }  // namespace tbm::dds

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "idl/cpp/boundary.h"
+#include "idl/cpp/guidance_messages.h"
 #include "idl/cpp/messages.h"
 #include "idl/cpp/participant.h"
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <string_view>
 
+#include "idl/cpp/guidance_messages.h"
 #include "idl/cpp/messages.h"
 #include "idl/cpp/qos.h"
 
@@ -24,9 +25,32 @@ inline constexpr TopicRow kRelativePoseTopic{
 inline constexpr TopicRow kDeviceHealthTopic{
     "tbm/v1/device_health", "tbm::v1::DeviceHealth", QosClass::kHealth};
 inline constexpr TopicRow kEventTopic{"tbm/v1/event", "tbm::v1::Event", QosClass::kEvents};
+inline constexpr TopicRow kStationObservationTopic{
+    "tbm/v1/station_observation", "tbm::v1::StationObservation", QosClass::kRecord};
+inline constexpr TopicRow kStationSetUpTopic{
+    "tbm/v1/station_set_up", "tbm::v1::StationSetUp", QosClass::kHealth};
+inline constexpr TopicRow kShieldPoseTopic{
+    "tbm/v1/shield_pose", "tbm::v1::ShieldPose", QosClass::kMeasurement};
+inline constexpr TopicRow kGuidanceTopic{
+    "tbm/v1/guidance", "tbm::v1::Guidance", QosClass::kMeasurement};
+inline constexpr TopicRow kAlarmStatusTopic{
+    "tbm/v1/alarm", "tbm::v1::AlarmStatus", QosClass::kHealth};
+inline constexpr TopicRow kCommandTopic{"tbm/v1/command", "tbm::v1::Command", QosClass::kRecord};
+inline constexpr TopicRow kCommandReplyTopic{
+    "tbm/v1/command_reply", "tbm::v1::CommandReply", QosClass::kRecord};
 
-inline constexpr std::array kTopics{
-    kFrameFeaturesTopic, kInclinationTopic, kRelativePoseTopic, kDeviceHealthTopic, kEventTopic};
+inline constexpr std::array kTopics{kFrameFeaturesTopic,
+                                    kInclinationTopic,
+                                    kRelativePoseTopic,
+                                    kDeviceHealthTopic,
+                                    kEventTopic,
+                                    kStationObservationTopic,
+                                    kStationSetUpTopic,
+                                    kShieldPoseTopic,
+                                    kGuidanceTopic,
+                                    kAlarmStatusTopic,
+                                    kCommandTopic,
+                                    kCommandReplyTopic};
 
 // The topic that carries a message type.
 template <class Message>
@@ -50,6 +74,34 @@ constexpr TopicRow TopicOf<DeviceHealth>() {
 template <>
 constexpr TopicRow TopicOf<Event>() {
   return kEventTopic;
+}
+template <>
+constexpr TopicRow TopicOf<StationObservation>() {
+  return kStationObservationTopic;
+}
+template <>
+constexpr TopicRow TopicOf<StationSetUp>() {
+  return kStationSetUpTopic;
+}
+template <>
+constexpr TopicRow TopicOf<ShieldPose>() {
+  return kShieldPoseTopic;
+}
+template <>
+constexpr TopicRow TopicOf<Guidance>() {
+  return kGuidanceTopic;
+}
+template <>
+constexpr TopicRow TopicOf<AlarmStatus>() {
+  return kAlarmStatusTopic;
+}
+template <>
+constexpr TopicRow TopicOf<Command>() {
+  return kCommandTopic;
+}
+template <>
+constexpr TopicRow TopicOf<CommandReply>() {
+  return kCommandReplyTopic;
 }
 
 }  // namespace tbm::dds

@@ -37,6 +37,34 @@ template <>
 struct WireOf<Event> {
   using Type = v1::Event;
 };
+template <>
+struct WireOf<StationObservation> {
+  using Type = v1::StationObservation;
+};
+template <>
+struct WireOf<StationSetUp> {
+  using Type = v1::StationSetUp;
+};
+template <>
+struct WireOf<ShieldPose> {
+  using Type = v1::ShieldPose;
+};
+template <>
+struct WireOf<Guidance> {
+  using Type = v1::Guidance;
+};
+template <>
+struct WireOf<AlarmStatus> {
+  using Type = v1::AlarmStatus;
+};
+template <>
+struct WireOf<Command> {
+  using Type = v1::Command;
+};
+template <>
+struct WireOf<CommandReply> {
+  using Type = v1::CommandReply;
+};
 
 // A sample as it came: `value` means something only when the bytes were exactly one value of the
 // type.

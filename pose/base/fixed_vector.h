@@ -51,6 +51,14 @@ class FixedVector {
   const T* begin() const { return items_.data(); }
   const T* end() const { return items_.data() + size_; }
 
+  bool operator==(const FixedVector& other) const {
+    if (size_ != other.size_) return false;
+    for (std::size_t i = 0; i < size_; ++i) {
+      if (!(items_[i] == other.items_[i])) return false;
+    }
+    return true;
+  }
+
  private:
   std::array<T, N> items_{};
   std::size_t size_ = 0;

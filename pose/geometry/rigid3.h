@@ -10,6 +10,8 @@ namespace tbm {
 struct Rigid3 {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();  // [m] origin of a, in b
+
+  bool operator==(const Rigid3&) const = default;  // of the numbers: -q is another q
 };
 
 inline Eigen::Vector3d operator*(const Rigid3& b_from_a, const Eigen::Vector3d& p_in_a) {
