@@ -1,29 +1,16 @@
 #include "guidance/config/axis_file.h"
 
-#include <array>
-
 #include <fmt/format.h>
-#include <openssl/evp.h>
 
 #include "devices/replay/csv.h"
 #include "guidance/config/axis_table.h"
 #include "guidance/config/landxml.h"
-#include "pose/base/check.h"
+#include "guidance/config/sha256.h"
 
 namespace tbm {
 namespace {
 
 constexpr std::size_t kMostBytes = std::size_t{256} << 20;
-
-std::string Sha256(std::string_view bytes) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned int size = 0;
-  TBM_CHECK(EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr) ==
-            1);
-  std::string text;
-  for (unsigned int i = 0; i < size; ++i) text += fmt::format("{:02x}", digest[i]);
-  return text;
-}
 
 Failure<AxisFileFaults> WholeFile(const std::string& file, std::string what) {
   return Failure{AxisFileFaults{{file, 0, "", std::move(what)}}};

@@ -1,119 +1,17 @@
 #include "pose/app/box_config.h"
 
-#include <filesystem>
-#include <fstream>
-#include <initializer_list>
-#include <set>
-#include <sstream>
-
 #include <arpa/inet.h>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "pose/base/angle.h"
 #include "pose/rig/rig_yaml.h"
+#include "pose/rig/yaml_section.h"
 
 namespace tbm {
 namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
-
-nanoseconds FromMs(double ms) { return nanoseconds(static_cast<std::int64_t>(ms * 1e6)); }
-
-// False for an absent section, which keeps its defaults, and for one of the wrong kind.
-bool IsSection(const YamlNode& node) {
-  if (!node.exists()) return false;
-  if (!node.IsMap()) node.Fault("must be a map of keys");
-  return node.IsMap();
-}
-
-// Reads optional members of one map into fields that hold their defaults, and remembers which names
-// it knows, so that the rest can be reported.
-class Section {
- public:
-  explicit Section(const YamlNode& node) : node_(node) {}
-
-  void Number(
-      std::string_view name, double low, double high, std::string_view unit, double* value) {
-    const YamlNode member = Know(name);
-    if (!member.exists()) return;
-    if (const auto number = member.Number({low, high, unit})) *value = *number;
-  }
-  void Time(std::string_view name, double low_ms, double high_ms, nanoseconds* value) {
-    double ms = 1e-6 * static_cast<double>(value->count());
-    Number(name, low_ms, high_ms, "ms", &ms);
-    *value = FromMs(ms);
-  }
-  void Angle(std::string_view name, double low_deg, double high_deg, double* value_rad) {
-    double deg = RadToDeg(*value_rad);
-    Number(name, low_deg, high_deg, "degree", &deg);
-    if (deg != RadToDeg(*value_rad)) *value_rad = DegToRad(deg);
-  }
-  void Integer(std::string_view name, int low, int high, int* value) {
-    const YamlNode member = Know(name);
-    if (!member.exists()) return;
-    if (const auto number = member.Integer(low, high)) *value = *number;
-  }
-  void Text(std::string_view name, std::string* value) {
-    const YamlNode member = Know(name);
-    if (!member.exists()) return;
-    if (const auto text = member.Text()) *value = *text;
-  }
-  void Flag(std::string_view name, bool* value) {
-    std::string word = *value ? "true" : "false";
-    if (Word(name, {"true", "false"}, &word)) *value = word == "true";
-  }
-  // One of `words`; false and a fault otherwise. True also when the member is absent.
-  bool Word(std::string_view name,
-            std::initializer_list<std::string_view> words,
-            std::string* value) {
-    const YamlNode member = Know(name);
-    if (!member.exists()) return true;
-    const auto text = member.Text();
-    if (!text) return false;
-    for (const std::string_view word : words) {
-      if (*text == word) {
-        *value = *text;
-        return true;
-      }
-    }
-    member.Fault(fmt::format("'{}' is not one of {}", *text, fmt::join(words, ", ")));
-    return false;
-  }
-  void Texts(std::string_view name, std::vector<std::string>* value) {
-    const YamlNode member = Know(name);
-    if (!member.exists()) return;
-    if (!member.IsList()) {
-      member.Fault("must be a list, e.g. [127.0.0.1]");
-      return;
-    }
-    value->clear();
-    for (const YamlNode& item : member.Items()) {
-      if (const auto text = item.Text()) value->push_back(*text);
-    }
-  }
-  YamlNode Know(std::string_view name) {
-    known_.insert(std::string(name));
-    return node_.Optional(name);
-  }
-  YamlNode Require(std::string_view name, std::string_view what_would_be_right) {
-    known_.insert(std::string(name));
-    return node_.Required(name, what_would_be_right);
-  }
-  // A mistyped optional key would be lost silently; in a config it is a fault.
-  void RefuseOthers() const {
-    for (const std::string& name : node_.Names()) {
-      if (known_.count(name) != 0) continue;
-      node_.Optional(name).Fault(
-          fmt::format("nobody reads this key; known here: {}", fmt::join(known_, ", ")));
-    }
-  }
-
- private:
-  YamlNode node_;
-  std::set<std::string> known_;
-};
 
 class Reader {
  public:
@@ -125,7 +23,7 @@ class Reader {
       root.Fault("the file must be a map with machine_id, rig, camera, inclinometers");
       return config;
     }
-    Section section(root);
+    YamlSection section(root);
     if (const auto id = section.Require("machine_id", "the machine's name, e.g. TBM-1").Text()) {
       config.machine_id = *id;
       if (id->empty() || id->size() > 32) {
@@ -145,16 +43,12 @@ class Reader {
   }
 
  private:
-  std::string Path(const std::string& path) const {
-    const std::filesystem::path given(path);
-    if (path.empty() || given.is_absolute()) return path;
-    return (std::filesystem::path(file_).parent_path() / given).string();
-  }
+  std::string Path(const std::string& path) const { return BesideFile(file_, path); }
 
   void ReadCamera(const YamlNode& node, BoxConfig* config) {
     if (!IsSection(node)) return;
     CameraConfig& camera = config->camera;
-    Section section(node);
+    YamlSection section(node);
     std::string driver;
     section.Require("driver", "gige, sim or replay");
     if (section.Word("driver", {"gige", "sim", "replay"}, &driver)) {
@@ -200,7 +94,7 @@ class Reader {
 
   void ReadInclinometers(const YamlNode& node, BoxConfig* config) {
     if (!IsSection(node)) return;
-    Section section(node);
+    YamlSection section(node);
     const YamlNode target = section.Require("target", "a map with driver and port");
     const YamlNode camera = section.Require("camera", "a map with driver and port");
     section.RefuseOthers();
@@ -216,7 +110,7 @@ class Reader {
 
   void ReadInclinometer(const YamlNode& node, InclinometerConfig* config) {
     if (!IsSection(node)) return;
-    Section section(node);
+    YamlSection section(node);
     std::string driver;
     section.Require("driver", "modbus, rion68, bewis77, sim or replay");
     if (section.Word("driver", {"modbus", "rion68", "bewis77", "sim", "replay"}, &driver) &&
@@ -258,7 +152,7 @@ class Reader {
 
   void ReadRegisters(const YamlNode& node, ModbusRegisterMap* map) {
     if (!IsSection(node)) return;
-    Section section(node);
+    YamlSection section(node);
     section.Integer("function", 3, 4, &map->function);
     std::string format = "int16";
     if (section.Word("format", {"int16", "uint16", "int32", "float32"}, &format)) {
@@ -285,7 +179,7 @@ class Reader {
   void ReadSolver(const YamlNode& node, BoxConfig* config) {
     if (!IsSection(node)) return;
     FrameSolverOptions& solver = config->solver;
-    Section section(node);
+    YamlSection section(node);
     section.Time("tilt_max_age_ms", 1.0, 10'000.0, &solver.tilt.max_age);
     nanoseconds wait = config->tilt_wait;
     section.Time("tilt_wait_ms", 0.0, 1000.0, &wait);
@@ -302,7 +196,7 @@ class Reader {
 
   void ReadDds(const YamlNode& node, BoxConfig* config) {
     if (!IsSection(node)) return;
-    Section section(node);
+    YamlSection section(node);
     section.Integer("domain", 0, 232, &config->dds.domain);
     section.Texts("interfaces", &config->dds.interfaces);
     section.Texts("initial_peers", &config->dds.initial_peers);
@@ -322,7 +216,7 @@ class Reader {
   void ReadRecording(const YamlNode& node, BoxConfig* config) {
     if (!IsSection(node)) return;
     BoxRecordingConfig& recording = config->recording;
-    Section section(node);
+    YamlSection section(node);
     section.Text("folder", &recording.folder);
     recording.folder = Path(recording.folder);
     int minutes = static_cast<int>(recording.run_length.count());
@@ -353,18 +247,9 @@ Result<BoxConfig, RigFileFaults> ParseBoxConfig(std::string_view yaml, const std
 }
 
 Result<BoxConfig, RigFileFaults> LoadBoxConfig(const std::string& path) {
-  constexpr std::size_t kLargest = 1'000'000;
-  std::ifstream stream(path, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  if (!stream.is_open() || stream.bad()) {
-    return Failure{
-        RigFileFaults{{path, 0, "", "cannot be read; give the path of a camera_box.yaml"}}};
-  }
-  if (text.str().size() > kLargest) {
-    return Failure{RigFileFaults{{path, 0, "", "larger than 1 MB: not a configuration"}}};
-  }
-  return ParseBoxConfig(text.str(), path);
+  const auto text = ReadConfigText(path, "camera_box.yaml");
+  if (!text) return Failure{text.error()};
+  return ParseBoxConfig(*text, path);
 }
 
 }  // namespace tbm

@@ -32,15 +32,15 @@ ALLOWED = {
     "devices/inclinometer": {"pose/base", "pose/geometry", "devices/bus", "devices/sim", "modbus", "fmt", *POSIX},
     "devices/replay": {"Eigen", *POSE_ALL, "png.h", "tiffio.h", "fmt", *POSIX},
     "devices/sim": {"Eigen", *POSE, "pose/centres/image_view.h"},
-    "devices/app": {"Eigen", *POSE_ALL, "devices", "fmt", "CLI", "yaml-cpp", *POSIX, "arv.h"},
-    "guidance/app": {"Eigen", *POSE_ALL, "devices", "guidance/axis", "guidance/config", "idl/cpp", "fmt", "CLI", "nlohmann", *POSIX},
+    "devices/app": {"Eigen", *POSE_ALL, "devices", "guidance/axis", "guidance/config", "guidance/core/machine.h", "fmt", "CLI", "yaml-cpp", *POSIX, "arv.h"},
+    "guidance/app": {"Eigen", *POSE_ALL, "devices", "guidance/axis", "guidance/config", "guidance/journal", "idl/cpp", "fmt", "CLI", "nlohmann", *POSIX},
     "guidance/station": {"Eigen", "pose/base", "pose/geometry", "pose/solve/tails.h"},
     "guidance/shield": {"Eigen", *POSE, "pose/solve",
                         "guidance/axis"},
     "guidance/axis": {"Eigen", "pose/base", "pose/geometry"},
     "guidance/core": {"Eigen", *POSE, "guidance/axis", "guidance/station", "guidance/shield"},
     "guidance/journal": {"pose/base", "zlib.h"},
-    "guidance/config": {"Eigen", "pose/base", "guidance/axis", "devices/replay/csv.h", "yaml-cpp", "fmt", "pugixml.hpp", "openssl"},
+    "guidance/config": {"Eigen", "pose/base", "pose/rig", "guidance/axis", "guidance/core/machine.h", "devices/replay/csv.h", "yaml-cpp", "fmt", "pugixml.hpp", "openssl"},
     "idl/cpp": {"Eigen", *POSE_ALL, "fastdds", "fastrtps", "fastcdr", "tbm_idl", "fmt", *POSIX},
 }
 # Folders that compute and do nothing else, and the standard headers that would betray them.
