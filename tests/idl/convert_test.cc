@@ -5,8 +5,11 @@
 
 #include <gtest/gtest.h>
 
+#include "idl/cpp/codec.h"
 #include "idl/cpp/reason_table.h"
+#include "idl/cpp/topics.h"
 #include "idl/cpp/wire_type.h"
+#include "tests/idl/guidance_samples.h"
 #include "tests/idl/samples.h"
 #include "tests/support/random.h"
 
@@ -39,6 +42,13 @@ TEST(Convert, KeepsEveryFieldThereAndBack) {
   EXPECT_TRUE(Same(FullRelativePose(), BackAgain(FullRelativePose())));
   EXPECT_TRUE(Same(FullDeviceHealth(), BackAgain(FullDeviceHealth())));
   EXPECT_TRUE(Same(FullEvent(), BackAgain(FullEvent())));
+  EXPECT_EQ(FullStationObservation(), BackAgain(FullStationObservation()));
+  EXPECT_EQ(FullStationSetUp(), BackAgain(FullStationSetUp()));
+  EXPECT_EQ(FullShieldPose(), BackAgain(FullShieldPose()));
+  EXPECT_EQ(FullGuidance(), BackAgain(FullGuidance()));
+  EXPECT_EQ(FullAlarmStatus(), BackAgain(FullAlarmStatus()));
+  EXPECT_EQ(FullCommand(), BackAgain(FullCommand()));
+  EXPECT_EQ(FullCommandReply(), BackAgain(FullCommandReply()));
 }
 
 TEST(Convert, WritesEachFieldUnderItsOwnName) {
@@ -196,6 +206,107 @@ TEST(Boundary, RefusesFeaturesHealthAndEventsThatBreakTheContract) {
             BoundaryFault::kEnumRange);
 }
 
+TEST(Convert, GuidanceWithoutNumbersSaysNaNAndNeverZero) {
+  ShieldPose pose = FullShieldPose();
+  pose.validity = Validity::kInvalid;  // with the numbers of the last pose still in it
+  const ShieldPose pose_back = BackAgain(pose);
+  EXPECT_TRUE(std::isnan(pose_back.heading_rad));
+  EXPECT_TRUE(pose_back.covariance.array().isNaN().all());
+  EXPECT_EQ(pose_back.reason, pose.reason);
+  EXPECT_EQ(pose_back.sample_number, pose.sample_number);
+
+  StationObservation observation = FullStationObservation();
+  observation.status = ObservationStatus::kNone;
+  const StationObservation none = BackAgain(observation);
+  EXPECT_TRUE(std::isnan(none.slope_m));
+  EXPECT_FALSE(none.has_position());
+  EXPECT_EQ(none.target, observation.target);
+  EXPECT_EQ(none.set_up_number, observation.set_up_number);
+
+  Guidance guidance = FullGuidance();
+  guidance.points[1].validity = Validity::kInvalid;
+  guidance.points[1].reason = "beyond_end";
+  const Guidance back = BackAgain(guidance);
+  EXPECT_TRUE(std::isnan(back.points[1].deviation_right_m));
+  EXPECT_EQ(back.points[1].official_section, -1);
+  EXPECT_EQ(back.points[1].name, guidance.points[1].name);
+  EXPECT_EQ(back.points[0], guidance.points[0]);
+}
+
+TEST(Boundary, RefusesStationAndGuidanceThatBreakTheContract) {
+  using O = v1::StationObservation;
+  using S = v1::StationSetUp;
+  using P = v1::ShieldPose;
+  using G = v1::Guidance;
+  const auto o = [](const std::function<void(O&)>& s) {
+    return After(FullStationObservation(), s);
+  };
+  const auto u = [](const std::function<void(S&)>& s) { return After(FullStationSetUp(), s); };
+  const auto p = [](const std::function<void(P&)>& s) { return After(FullShieldPose(), s); };
+  const auto g = [](const std::function<void(G&)>& s) { return After(FullGuidance(), s); };
+  EXPECT_EQ(o([](O& x) { x.target(""); }), BoundaryFault::kNoKey);
+  EXPECT_EQ(o([](O& x) { x.sensed_at_utc_ns(-1); }), BoundaryFault::kNoTime);
+  EXPECT_EQ(o([](O& x) { x.face(static_cast<v1::ObservationFace>(2)); }),
+            BoundaryFault::kEnumRange);
+  EXPECT_EQ(o([](O& x) { x.reason(""); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(o([](O& x) { x.status(v1::OBSERVATION_NONE); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(o([](O& x) { x.set_up_number(0); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(o([](O& x) { x.slope_m(kNaN); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(o([](O& x) { x.slope_m(-1.0); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(o([](O& x) { x.circle_rad(kNaN); }), BoundaryFault::kNotFinite);
+  EXPECT_EQ(o([](O& x) { x.by_station()[3] = kNaN; }), BoundaryFault::kNotFinite);
+  EXPECT_EQ(o([](O& x) { x.covariance_of_reading_m2()[4] = -1.0; }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(u([](S& x) { x.role(""); }), BoundaryFault::kNoKey);
+  EXPECT_EQ(u([](S& x) { x.last_good_check_at_utc_ns(0); }), BoundaryFault::kNoTime);
+  EXPECT_EQ(u([](S& x) { x.state(v1::SET_UP_NONE); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(u([](S& x) { x.reason(""); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(u([](S& x) { x.set_up_number(0); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(u([](S& x) { x.covariance()[1] += 1.0; }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(u([](S& x) { x.closure_worst_m(-1.0); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(u([](S& x) { x.references().resize(17); }), BoundaryFault::kTooLong);
+  EXPECT_EQ(u([](S& x) { x.references()[1].checked_share(1.1); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(p([](P& x) { x.shield(""); }), BoundaryFault::kNoKey);
+  EXPECT_EQ(p([](P& x) { x.validity(v1::GUIDANCE_VALID); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(p([](P& x) { x.validity(v1::GUIDANCE_INVALID); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(p([](P& x) { x.site_from_shield_qx(0.2); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(p([](P& x) { x.position_in_site_m()[2] = kNaN; }), BoundaryFault::kNotFinite);
+  EXPECT_EQ(p([](P& x) { x.covariance()[7] = -1.0; }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(g([](G& x) { x.valid_at_utc_ns(0); }), BoundaryFault::kNoTime);
+  EXPECT_EQ(g([](G& x) { x.reason(""); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(g([](G& x) { x.stroke_sigma_m(-1.0); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(g([](G& x) { x.lead_right_per_m(kNaN); }), BoundaryFault::kNone);  // not known
+  EXPECT_EQ(g([](G& x) { x.points().resize(17); }), BoundaryFault::kTooLong);
+  EXPECT_EQ(g([](G& x) { x.points()[0].deviation_right_m(kNaN); }), BoundaryFault::kNotFinite);
+  EXPECT_EQ(g([](G& x) { x.points()[0].deviation_up_m(kNaN); }), BoundaryFault::kNone);
+  EXPECT_EQ(g([](G& x) { x.points()[0].validity(v1::GUIDANCE_INVALID); }),
+            BoundaryFault::kContradiction);
+  EXPECT_EQ(g([](G& x) { x.points()[1].right_up_correlation(1.5); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(g([](G& x) { x.ahead()[0].ahead_m(0.0); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(g([](G& x) { x.sources()[0].age_s(kNaN); }), BoundaryFault::kContradiction);
+}
+
+TEST(Boundary, RefusesAlarmsAndCommandsThatBreakTheContract) {
+  using A = v1::AlarmStatus;
+  using C = v1::Command;
+  using R = v1::CommandReply;
+  const auto a = [](const std::function<void(A&)>& s) { return After(FullAlarmStatus(), s); };
+  const auto c = [](const std::function<void(C&)>& s) { return After(FullCommand(), s); };
+  const auto r = [](const std::function<void(R&)>& s) { return After(FullCommandReply(), s); };
+  EXPECT_EQ(a([](A& x) { x.code(""); }), BoundaryFault::kNoKey);
+  EXPECT_EQ(a([](A& x) { x.phase(static_cast<v1::AlarmPhase>(4)); }), BoundaryFault::kEnumRange);
+  EXPECT_EQ(a([](A& x) { x.raised_at_utc_ns(-1); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(a([](A& x) { x.times_raised(0); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(a([](A& x) { x.clear_below(60.0); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(a([](A& x) { x.raise_above(kNaN); }), BoundaryFault::kNotFinite);
+  EXPECT_EQ(a([](A& x) { x.value(kNaN); }), BoundaryFault::kNone);  // not known
+  EXPECT_EQ(c([](C& x) { x.request_id(""); }), BoundaryFault::kNoKey);
+  EXPECT_EQ(c([](C& x) { x.by(""); }), BoundaryFault::kNoKey);
+  EXPECT_EQ(c([](C& x) { x.expires_at_utc_ns(1); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(r([](R& x) { x.outcome(static_cast<v1::CommandOutcome>(4)); }),
+            BoundaryFault::kEnumRange);
+  EXPECT_EQ(r([](R& x) { x.published_at_utc_ns(0); }), BoundaryFault::kNoTime);
+}
+
 template <class Message>
 std::vector<char> Encoded(const Message& message) {
   WireSample<Wire<Message>> sample;
@@ -215,8 +326,26 @@ struct Fulls {
   static RelativePose Of(const RelativePose*) { return FullRelativePose(); }
   static DeviceHealth Of(const DeviceHealth*) { return FullDeviceHealth(); }
   static Event Of(const Event*) { return FullEvent(); }
+  static StationObservation Of(const StationObservation*) { return FullStationObservation(); }
+  static StationSetUp Of(const StationSetUp*) { return FullStationSetUp(); }
+  static ShieldPose Of(const ShieldPose*) { return FullShieldPose(); }
+  static Guidance Of(const Guidance*) { return FullGuidance(); }
+  static AlarmStatus Of(const AlarmStatus*) { return FullAlarmStatus(); }
+  static Command Of(const Command*) { return FullCommand(); }
+  static CommandReply Of(const CommandReply*) { return FullCommandReply(); }
 };
-using Messages = testing::Types<FrameFeatures, TiltReading, RelativePose, DeviceHealth, Event>;
+using Messages = testing::Types<FrameFeatures,
+                                TiltReading,
+                                RelativePose,
+                                DeviceHealth,
+                                Event,
+                                StationObservation,
+                                StationSetUp,
+                                ShieldPose,
+                                Guidance,
+                                AlarmStatus,
+                                Command,
+                                CommandReply>;
 TYPED_TEST_SUITE(Bytes, Messages);
 
 TYPED_TEST(Bytes, CutAtEveryLengthAreRefused) {
@@ -228,6 +357,26 @@ TYPED_TEST(Bytes, CutAtEveryLengthAreRefused) {
     EXPECT_FALSE(Decode(cut.data(), cut.size(), sample)) << size;
     EXPECT_EQ(Check(sample.value), BoundaryFault::kNoKey);  // nothing of it is left
   }
+}
+
+// What a journal holds is what DDS sends, and it comes back whole.
+TYPED_TEST(Bytes, OfTheCodecAreThoseOfTheWire) {
+  const TypeParam full = Fulls::Of(static_cast<TypeParam*>(nullptr));
+  std::vector<std::byte> bytes;
+  ASSERT_EQ(EncodeCdr(full, &bytes), BoundaryFault::kNone);
+  const auto on_wire = Encoded(full);
+  ASSERT_EQ(bytes.size(), on_wire.size());
+  EXPECT_EQ(std::memcmp(bytes.data(), on_wire.data(), bytes.size()), 0);
+  TypeParam back;
+  ASSERT_EQ(DecodeCdr<TypeParam>(bytes, &back), BoundaryFault::kNone);
+  EXPECT_TRUE(Same(full, back));
+  bytes.pop_back();
+  EXPECT_NE(DecodeCdr<TypeParam>(bytes, &back), BoundaryFault::kNone);
+  EXPECT_EQ(EncodeCdr(TypeParam{}, &bytes), BoundaryFault::kNoKey);
+  EXPECT_TRUE(bytes.empty());
+  const std::string_view type = TopicOf<TypeParam>().type;
+  const std::string struct_name = "struct " + std::string(type.substr(type.rfind(':') + 1)) + " {";
+  EXPECT_NE(IdlTextOf(type).find(struct_name), std::string_view::npos) << struct_name;
 }
 
 TYPED_TEST(Bytes, GluedOrWithAFieldMoreAreRefused) {
