@@ -1,0 +1,115 @@
+#include "guidance/core/rear_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tbm {
+namespace {
+
+// Boring or regripping, nobody says which: both lie within two sigma.
+constexpr double kSpeedPrior_m_per_s = 5e-3;
+// Readings of one second share the vibration of that second: averaging more of them gains nothing.
+constexpr int kMostIndependentTilts = 25;
+
+GuidanceReason ReasonOf(RearShieldFailure failure) {
+  switch (failure) {
+    case RearShieldFailure::kTooFewFixes:
+    case RearShieldFailure::kNoStart:
+      return GuidanceReason::kTooFewPrisms;
+    case RearShieldFailure::kNotObservable:
+      return GuidanceReason::kNotObservable;
+    case RearShieldFailure::kNotFinite:
+    case RearShieldFailure::kNotConverged:
+    case RearShieldFailure::kInconsistent:
+      return GuidanceReason::kPrismsDisagree;
+  }
+  return GuidanceReason::kPrismsDisagree;
+}
+
+}  // namespace
+
+bool RearTracker::IsTrusted(Timestamp sensed_at) const {
+  return set_up_ && set_up_->number != 0 &&
+         !(set_up_->trusted_until && sensed_at > *set_up_->trusted_until);
+}
+
+void RearTracker::Add(const PrismSeen& seen, const TiltMean& camera_tilt) {
+  if (seen.prism >= machine_.prisms.size()) return;
+  Kept& kept = kept_[seen.prism];
+  // Late and doubled readings change nothing.
+  const bool is_newer =
+      !kept.is_there || seen.set_up_number > kept.seen.set_up_number ||
+      (seen.set_up_number == kept.seen.set_up_number && seen.sensed_at > kept.seen.sensed_at);
+  if (!is_newer) return;
+  kept = {seen, true};
+  Fix(camera_tilt);
+}
+
+void RearTracker::Add(const SetUpKnown& set_up, const TiltMean& camera_tilt) {
+  const bool is_another =
+      !set_up_ || set_up_->number != set_up.number || set_up_->covariance != set_up.covariance;
+  set_up_ = set_up;
+  if (set_up.number == 0) {
+    trouble_ = GuidanceReason::kNoSetUp;
+  } else if (is_another) {
+    trouble_ = past_.empty() ? GuidanceReason::kNoFix : GuidanceReason::kNone;
+    Fix(camera_tilt);
+  }
+}
+
+void RearTracker::Fix(const TiltMean& camera_tilt) {
+  if (!set_up_ || set_up_->number == 0) return;
+  RearShieldProblem problem;
+  problem.station_covariance = set_up_->covariance;
+  problem.speed_sigma_m_per_s = kSpeedPrior_m_per_s;
+  Timestamp newest{};
+  for (const Kept& kept : kept_) {
+    if (kept.is_there && kept.seen.set_up_number == set_up_->number) {
+      newest = std::max(newest, kept.seen.sensed_at);
+    }
+  }
+  for (std::size_t i = 0; i < machine_.prisms.size(); ++i) {
+    problem.prisms.push_back(machine_.prisms[i].prism);
+    const Kept& kept = kept_[i];
+    if (!kept.is_there || kept.seen.set_up_number != set_up_->number ||
+        SecondsBetween(kept.seen.sensed_at, newest) > machine_.fix_window_s) {
+      continue;
+    }
+    problem.fixes.push_back({static_cast<int>(i),
+                             kept.seen.sensed_at,
+                             kept.seen.p_in_site,
+                             kept.seen.covariance,
+                             kept.seen.by_station});
+  }
+  if (problem.fixes.empty()) return;
+  problem.at = newest;
+  if (const auto tilt = camera_tilt.Around(newest)) {
+    const double sigma_rad =
+        rig_.camera_tilt.sigma_rad / std::sqrt(std::min(tilt->count, kMostIndependentTilts));
+    problem.up = UpOfRearShield(rig_, machine_.geometry, tilt->inclination, sigma_rad);
+  }
+  if (!past_.empty()) problem.start = past_.back().fix.site_from_rear_shield;
+  const auto fix = FixRearShield(problem, {});
+  if (!fix) {
+    trouble_ = ReasonOf(fix.error());
+    return;
+  }
+  trouble_ = GuidanceReason::kNone;
+  if (past_.full()) past_.erase(0);
+  past_.push_back({*fix, newest});
+}
+
+const RearShieldFix* RearTracker::fix() const {
+  for (std::size_t i = past_.size(); i-- > 0;) {
+    if (IsTrusted(past_[i].newest_reading)) return &past_[i].fix;
+  }
+  return nullptr;
+}
+
+void RearTracker::Forget() {
+  past_.clear();
+  for (Kept& kept : kept_) kept.is_there = false;
+  trouble_ = set_up_number() == 0 ? GuidanceReason::kNoSetUp : GuidanceReason::kNoFix;
+}
+
+}  // namespace tbm

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "guidance/core/input.h"
+#include "guidance/core/machine.h"
+#include "guidance/core/reason.h"
+#include "guidance/core/tilt_mean.h"
+#include "guidance/shield/rear_shield.h"
+#include "pose/base/fixed_vector.h"
+
+namespace tbm {
+
+// The rear shield from what the total station sees, prism by prism: keeps the last reading of each
+// prism, makes a fix with every new one, and remembers past fixes, because a check of the
+// references may say later that the newest are not to be used. No heap.
+class RearTracker {
+ public:
+  RearTracker(const Machine& machine, const Rig& rig) : machine_(machine), rig_(rig) {}
+
+  void Add(const PrismSeen& seen, const TiltMean& camera_tilt);
+  void Add(const SetUpKnown& set_up, const TiltMean& camera_tilt);
+
+  // The newest fix that rests on nothing but trusted readings.
+  const RearShieldFix* fix() const;
+  // The station may have moved: readings after a moment are not to be used.
+  bool IsSuspect() const { return set_up_ && set_up_->number != 0 && set_up_->trusted_until; }
+  GuidanceReason trouble() const { return trouble_; }
+  std::uint64_t set_up_number() const { return set_up_ ? set_up_->number : 0; }
+
+  void Forget();  // everything but the set-up: the clock was set
+
+ private:
+  static constexpr std::size_t kMostFixes = 64;
+
+  struct Kept {
+    PrismSeen seen;
+    bool is_there = false;
+  };
+  struct PastFix {
+    RearShieldFix fix;
+    Timestamp newest_reading;
+  };
+
+  void Fix(const TiltMean& camera_tilt);
+  bool IsTrusted(Timestamp sensed_at) const;
+
+  const Machine& machine_;
+  const Rig& rig_;
+  std::array<Kept, kMaxPrisms> kept_{};
+  std::optional<SetUpKnown> set_up_;
+  FixedVector<PastFix, kMostFixes> past_;  // oldest first
+  GuidanceReason trouble_ = GuidanceReason::kNoSetUp;
+};
+
+}  // namespace tbm
