@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "devices/app/fault_options.h"
+#include "devices/app/tunnel_options.h"
 #include "pose/base/clock.h"
 #include "pose/rig/rig_file.h"
 
@@ -66,12 +67,35 @@ void AddMachineOptions(CLI::App& app, MachineOptions& o) {
   app.add_option("--reflection", o.reflections, "MIRROR_U,DU,DV,STRENGTH[@FROM-TO] in px");
   app.add_option("--tilt-fault", o.tilt_faults, "target|camera,BETA,GAMMA[@FROM-TO] in degrees");
   app.add_flag("--stamp-sequence", o.camera.stamp_sequence, "count in the frame's first bytes");
-  app.add_option("--truth", o.truth_file, "write truth.csv, one row per exposure");
+  app.add_option(
+      "--truth",
+      o.truth_file,
+      "write truth.csv, one row per exposure; of a machine in its tunnel also NAME_shields"
+      ".csv beside it");
   app.add_option("--run-for", o.run_for_s, "end after so many seconds; 0: on a signal");
 }
 
-Result<std::shared_ptr<const sim::World>, std::string> BuildWorld(const MachineOptions& options) {
-  auto loaded = LoadRigFile(options.rig_file);
+void AddTunnelOptions(CLI::App& app, MachineOptions& o) {
+  app.get_option("--rig")->required(false);
+  app.add_option("--machine",
+                 o.machine_file,
+                 "machine.yaml instead of --rig: the machine drives along its design axis");
+  app.add_option("--chainage",
+                 o.chainage_m,
+                 "of the rear shield when the world begins, internal [m]; else 60 m into the axis");
+}
+
+Result<SimulatedMachine, std::string> BuildMachine(const MachineOptions& options) {
+  std::optional<LoadedTunnel> tunnel;
+  if (!options.machine_file.empty()) {
+    auto loaded = LoadTunnel(options.machine_file, options.chainage_m);
+    if (!loaded) return Failure{loaded.error()};
+    tunnel = std::move(loaded).value();
+  } else if (options.chainage_m || options.rig_file.empty()) {
+    return Failure{std::string("--machine: wanted a machine.yaml, or --rig without a tunnel\n")};
+  }
+  auto loaded =
+      LoadRigFile(tunnel && options.rig_file.empty() ? tunnel->file.rig_file : options.rig_file);
   std::string problems;
   if (!loaded) {
     for (const RigFileFault& fault : loaded.error()) problems += fault.Text() + "\n";
@@ -90,8 +114,17 @@ Result<std::shared_ptr<const sim::World>, std::string> BuildWorld(const MachineO
   faults.reflections = ParseAll<sim::Reflection>(options.reflections, ParseReflection, problems);
   faults.tilts = ParseAll<sim::TiltFault>(options.tilt_faults, ParseTiltFault, problems);
   if (!problems.empty()) return Failure{problems};
-  return std::shared_ptr<const sim::World>(std::make_shared<sim::World>(
-      rig, motion, std::move(faults), SystemClock().Now(), options.speed));
+  SimulatedMachine machine;
+  machine.begins_at = SystemClock().Now();
+  machine.world = std::make_shared<sim::World>(
+      rig,
+      motion,
+      std::move(faults),
+      machine.begins_at,
+      options.speed,
+      tunnel ? std::optional(std::move(tunnel->tunnel)) : std::nullopt);
+  if (tunnel) machine.file = std::move(tunnel->file);
+  return machine;
 }
 
 }  // namespace tbm

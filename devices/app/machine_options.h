@@ -11,6 +11,7 @@
 #include "devices/app/gige_simulator.h"
 #include "devices/sim/camera_view.h"
 #include "devices/sim/world.h"
+#include "guidance/config/machine_file.h"
 #include "pose/base/result.h"
 
 namespace tbm {
@@ -19,6 +20,8 @@ namespace tbm {
 struct MachineOptions {
   GigeSimulatorOptions camera;
   std::string rig_file;
+  std::string machine_file;  // machine.yaml instead of the rig: the whole machine in its tunnel
+  std::optional<double> chainage_m;
   std::string truth_file;
   double run_for_s = 0.0;  // 0: until a signal comes
   double speed = 1.0;
@@ -34,8 +37,17 @@ struct MachineOptions {
 
 void AddMachineOptions(CLI::App& app, MachineOptions& options);
 
-// The world that the options describe, beginning now. All faults of the command line and of the rig
-// file at once, one a line.
-Result<std::shared_ptr<const sim::World>, std::string> BuildWorld(const MachineOptions& options);
+// --machine and --chainage, after AddMachineOptions.
+void AddTunnelOptions(CLI::App& app, MachineOptions& options);
+
+struct SimulatedMachine {
+  std::shared_ptr<const sim::World> world;
+  std::optional<MachineFile> file;  // of a machine in a tunnel
+  Timestamp begins_at;
+};
+
+// What the options describe, beginning now. All faults of the command line and of the files at
+// once, one a line.
+Result<SimulatedMachine, std::string> BuildMachine(const MachineOptions& options);
 
 }  // namespace tbm

@@ -25,24 +25,25 @@ int RunSimulator(CLI::App& app,
     return app.exit(error) == 0 ? kDone : kWrongCommand;
   }
   HoldSignals();
-  const auto world = BuildWorld(options);
-  if (!world) {
-    fmt::print(stderr, "{}", world.error());
+  const auto machine = BuildMachine(options);
+  if (!machine) {
+    fmt::print(stderr, "{}", machine.error());
     return kWrongCommand;
   }
-  TruthWriter truth(options.truth_file, *world);
+  const auto& world = machine->world;
+  TruthWriter truth(options.truth_file, world);
   if (!options.truth_file.empty() && !truth.is_open()) {
     fmt::print(stderr, "--truth {}: cannot be written\n", options.truth_file);
     return kWrongCommand;
   }
   const Result<std::string, std::string> instruments =
-      start_instruments ? start_instruments(*world) : std::string();
+      start_instruments ? start_instruments(*machine) : std::string();
   if (!instruments) {
     fmt::print(stderr, "{}: {}\n", app.get_name(), instruments.error());
     return kDevice;
   }
   const auto camera =
-      GigeSimulator::Start(options.camera, *world, options.view, [&truth](const Shown& shown) {
+      GigeSimulator::Start(options.camera, world, options.view, [&truth](const Shown& shown) {
         truth.Write(shown.sensed_at);
       });
   if (!camera) {

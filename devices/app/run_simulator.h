@@ -1,13 +1,11 @@
 #pragma once
 
 #include <functional>
-#include <memory>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
 #include "devices/app/machine_options.h"
-#include "devices/sim/world.h"
 #include "pose/base/result.h"
 
 namespace tbm {
@@ -15,7 +13,7 @@ namespace tbm {
 // Starts what else looks at the world, kept alive by the caller. The value is what to print about
 // it once the camera is up, one line each.
 using StartInstruments =
-    std::function<Result<std::string, std::string>(std::shared_ptr<const sim::World> world)>;
+    std::function<Result<std::string, std::string>(const SimulatedMachine& machine)>;
 
 // A simulator program from command line to exit code: the world, the instruments, the camera that
 // looks at it, truth.csv where asked for; until a signal comes or the time is over.

@@ -69,51 +69,13 @@ std::optional<Windowed> ParseWindowed(std::string_view text) {
   return Windowed{text.substr(0, at), {*from, *to}};
 }
 
-struct PrismRow {
-  std::string name;
-  Eigen::Vector3d p_in_site;
-  Eigen::Vector3d velocity_m_per_s = Eigen::Vector3d::Zero();
-  double constant_m = 0.0;
-};
-
-Result<std::vector<PrismRow>, std::string> ReadPrisms(const std::string& path) {
-  auto text = ReadTextFile(path, 1 << 20);
-  if (!text) return Failure{text.error().Text()};
-  constexpr std::array<std::string_view, 4> kRequired = {"prism", "x_m", "y_m", "z_m"};
-  const auto table = CsvTable::Parse(*text, path, kRequired);
-  if (!table) return Failure{table.error().Text()};
-  std::optional<FileFault> fault;
-  const auto value = [&](std::size_t row, std::string_view name) {
-    const auto column = table->Column(name);
-    if (!column) return 0.0;
-    const auto number = table->Finite(row, *column);
-    if (!number && !fault) fault = number.error();
-    return number ? *number : 0.0;
-  };
-  std::vector<PrismRow> rows;
-  for (std::size_t row = 0; row < table->row_count(); ++row) {
-    PrismRow prism;
-    prism.name = table->Field(row, *table->Column("prism"));
-    prism.p_in_site = {value(row, "x_m"), value(row, "y_m"), value(row, "z_m")};
-    prism.velocity_m_per_s =
-        1e-3 * Eigen::Vector3d(
-                   value(row, "vx_mm_per_s"), value(row, "vy_mm_per_s"), value(row, "vz_mm_per_s"));
-    prism.constant_m = value(row, "constant_mm") * 1e-3;
-    rows.push_back(prism);
-  }
-  if (fault) return Failure{fault->Text()};
-  return rows;
-}
-
 // Collects what is wrong, one a line, so that all is said at once.
 class Reader {
  public:
-  Reader(const StationOptions& options, Timestamp start) : o_(options), start_(start) {}
+  Reader(const StationOptions& options, std::vector<SimulatedPrism> prisms, Timestamp start)
+      : o_(options), start_(start), prisms_(std::move(prisms)) {}
 
   Result<SimulatedStation, std::string> Read() {
-    auto rows = ReadPrisms(o_.prisms_file);
-    if (!rows) return Failure{rows.error() + "\n"};
-    rows_ = std::move(rows).value();
     ReadPillar();
     ReadErrors();
     ReadPrismsInTime();
@@ -138,8 +100,8 @@ class Reader {
     return Eigen::Vector3d::Zero();
   }
   std::optional<std::size_t> Find(std::string_view name) const {
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      if (rows_[i].name == name) return i;
+    for (std::size_t i = 0; i < prisms_.size(); ++i) {
+      if (prisms_[i].name == name) return i;
     }
     return std::nullopt;
   }
@@ -184,15 +146,15 @@ class Reader {
       std::size_t other;
       Window window;
     };
-    std::vector<std::vector<Window>> hidden(rows_.size());
-    std::vector<std::vector<Swap>> swaps(rows_.size());
+    std::vector<std::vector<Window>> hidden(prisms_.size());
+    std::vector<std::vector<Swap>> swaps(prisms_.size());
     for (const std::string& text : o_.hidden) {
       const auto parsed = ParseWindowed(text);
       const auto prism = parsed ? Find(parsed->what) : std::nullopt;
       if (prism) {
         hidden[*prism].push_back(parsed->window);
       } else {
-        Wrong("hide", text, "a prism of the file, such as left or left@10-20");
+        Wrong("hide", text, "one prism by name, such as left or left@10-20");
       }
     }
     for (const std::string& text : o_.swaps) {
@@ -204,12 +166,13 @@ class Reader {
         swaps[*a].push_back({*b, parsed->window});
         swaps[*b].push_back({*a, parsed->window});
       } else {
-        Wrong("swap", text, "two prisms of the file, such as left,right@10-20");
+        Wrong("swap", text, "two prisms by name, such as left,right@10-20");
       }
     }
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      const auto in_time = [rows = rows_, i, hides = hidden[i], changes = swaps[i], start = start_](
-                               Timestamp at) -> std::optional<Eigen::Vector3d> {
+    for (std::size_t i = 0; i < prisms_.size(); ++i) {
+      const auto in_time =
+          [all = prisms_, i, hides = hidden[i], changes = swaps[i], start = start_](
+              Timestamp at) -> std::optional<Eigen::Vector3d> {
         const double t_s = SecondsBetween(start, at);
         for (const Window& window : hides) {
           if (window.Contains(t_s)) return std::nullopt;
@@ -218,9 +181,9 @@ class Reader {
         for (const Swap& swap : changes) {
           if (swap.window.Contains(t_s)) place = swap.other;
         }
-        return rows[place].p_in_site + t_s * rows[place].velocity_m_per_s;
+        return all[place].p_in_site(at);
       };
-      station_.instrument.prisms.push_back({rows_[i].name, in_time, rows_[i].constant_m});
+      station_.instrument.prisms.push_back({prisms_[i].name, in_time, prisms_[i].constant_m});
     }
   }
 
@@ -247,7 +210,7 @@ class Reader {
 
   const StationOptions& o_;
   const Timestamp start_;
-  std::vector<PrismRow> rows_;
+  std::vector<SimulatedPrism> prisms_;
   SimulatedStation station_;
   std::string problems_;
 };
@@ -258,14 +221,6 @@ void AddStationOptions(CLI::App& app, StationOptions& o) {
   const auto number = [&](const char* name, double& value, const char* help) {
     app.add_option(name, value, help)->capture_default_str();
   };
-  app.add_option("--prisms", o.prisms_file, "CSV prism,x_m,y_m,z_m[,constant_mm,vx_mm_per_s,..]")
-      ->required();
-  app.add_option("--address", o.address, "IPv4 address on this computer")->capture_default_str();
-  app.add_option("--port", o.tcp_port, "TCP port; 0: the system chooses, the first line tells")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 65535));
-  app.add_option(
-      "--serial-link", o.serial_link, "link to a serial port to be made, instead of TCP");
   app.add_option("--station", o.station, "X,Y,Z of the instrument in site [m]")
       ->capture_default_str();
   number("--circle-zero-deg", o.circle_zero_deg, "bearing of the circle's zero, from north");
@@ -284,7 +239,6 @@ void AddStationOptions(CLI::App& app, StationOptions& o) {
   number("--refraction-k", o.errors.refraction_k, "curvature of the sight over the earth's");
   number("--earth-radius-m", o.errors.earth_radius_m, "1e15: flat");
   number("--lateral-bend", o.lateral_bend_arcsec_per_100m, "to the right [arcsec per 100 m]");
-  app.add_option("--seed", o.errors.seed, "of noise and faults")->capture_default_str();
   app.add_option("--serial-number", o.emulator.serial_number, "that it tells")
       ->capture_default_str();
   app.add_option("--battery", o.emulator.battery_percent, "charge [%]")
@@ -299,11 +253,44 @@ void AddStationOptions(CLI::App& app, StationOptions& o) {
   app.add_option("--swap", o.swaps, "PRISM,PRISM[@FROM-TO]: each stands where the other belongs");
   app.add_option("--fault", o.faults, "KIND:RATIO[:CODE] of the line; may be repeated");
   number("--late-ms", o.late_ms, "how late `late` is, and the pause of `split`");
-  app.add_option("--run-for", o.run_for_s, "end after so many seconds; 0: on a signal");
 }
 
-Result<SimulatedStation, std::string> BuildStation(const StationOptions& options, Timestamp start) {
-  return Reader(options, start).Read();
+Result<std::vector<SimulatedPrism>, std::string> ReadPrisms(const std::string& path,
+                                                            std::string_view name_column,
+                                                            Timestamp start) {
+  auto text = ReadTextFile(path, 1 << 20);
+  if (!text) return Failure{text.error().Text()};
+  const std::array<std::string_view, 4> required = {name_column, "x_m", "y_m", "z_m"};
+  const auto table = CsvTable::Parse(*text, path, required);
+  if (!table) return Failure{table.error().Text()};
+  std::optional<FileFault> fault;
+  const auto value = [&](std::size_t row, std::string_view name) {
+    const auto column = table->Column(name);
+    if (!column) return 0.0;
+    const auto number = table->Finite(row, *column);
+    if (!number && !fault) fault = number.error();
+    return number ? *number : 0.0;
+  };
+  std::vector<SimulatedPrism> prisms;
+  for (std::size_t row = 0; row < table->row_count(); ++row) {
+    const Eigen::Vector3d p_in_site(value(row, "x_m"), value(row, "y_m"), value(row, "z_m"));
+    const Eigen::Vector3d velocity_m_per_s =
+        1e-3 * Eigen::Vector3d(
+                   value(row, "vx_mm_per_s"), value(row, "vy_mm_per_s"), value(row, "vz_mm_per_s"));
+    prisms.push_back({std::string(table->Field(row, *table->Column(name_column))),
+                      [=](Timestamp at) -> Eigen::Vector3d {
+                        return p_in_site + SecondsBetween(start, at) * velocity_m_per_s;
+                      },
+                      value(row, "constant_mm") * 1e-3});
+  }
+  if (fault) return Failure{fault->Text()};
+  return prisms;
+}
+
+Result<SimulatedStation, std::string> BuildStation(const StationOptions& options,
+                                                   std::vector<SimulatedPrism> prisms,
+                                                   Timestamp start) {
+  return Reader(options, std::move(prisms), start).Read();
 }
 
 }  // namespace tbm

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -16,8 +18,6 @@ struct StationOptions {
   std::string address = "127.0.0.1";
   int tcp_port = 1212;
   std::string serial_link;  // a pseudo-terminal instead of TCP
-  std::string prisms_file;
-  double run_for_s = 0.0;  // 0: until a signal comes
 
   std::string station = "0,0,0";
   double circle_zero_deg = 0.0;
@@ -47,7 +47,21 @@ struct StationOptions {
   std::vector<std::string> faults;
 };
 
+// All but address, ports and `seed`, which every program has its own of.
 void AddStationOptions(CLI::App& app, StationOptions& options);
+
+// A prism where it really stands, in `site`.
+struct SimulatedPrism {
+  std::string name;
+  std::function<Eigen::Vector3d(Timestamp)> p_in_site;
+  double constant_m = 0.0;  // what has to be added to a raw distance
+};
+
+// The prisms of a CSV: `name_column`,x_m,y_m,z_m in `site`; optional constant_mm and vx_mm_per_s,
+// vy_mm_per_s, vz_mm_per_s. They stand there at `start`.
+Result<std::vector<SimulatedPrism>, std::string> ReadPrisms(const std::string& path,
+                                                            std::string_view name_column,
+                                                            Timestamp start);
 
 struct SimulatedStation {
   EmulatedInstrument instrument;
@@ -59,11 +73,10 @@ struct SimulatedStation {
   std::vector<Fault> faults;
 };
 
-// The instrument that the options describe, its world's time beginning at `start`. All faults of
-// the command line and of the prisms file at once, one a line.
-//
-// The prisms file is a CSV: prism,x_m,y_m,z_m in `site`; optional constant_mm (what has to be added
-// to a raw distance) and vx_mm_per_s, vy_mm_per_s, vz_mm_per_s.
-Result<SimulatedStation, std::string> BuildStation(const StationOptions& options, Timestamp start);
+// The instrument that the options describe among these prisms, its windows counting from `start`.
+// All faults of the command line at once, one a line.
+Result<SimulatedStation, std::string> BuildStation(const StationOptions& options,
+                                                   std::vector<SimulatedPrism> prisms,
+                                                   Timestamp start);
 
 }  // namespace tbm

@@ -1,11 +1,9 @@
 #include <cstdio>
-#include <optional>
 
 #include <fmt/format.h>
 
 #include "devices/app/end_signals.h"
-#include "devices/app/station_options.h"
-#include "devices/bus/tcp_server.h"
+#include "devices/app/station_emulator.h"
 #include "pose/base/clock.h"
 
 namespace {
@@ -18,6 +16,20 @@ int main(int argc, char** argv) {
   CLI::App app("A motorised total station on this computer that speaks GeoCOM and sees prisms.",
                "total_station_sim");
   tbm::StationOptions options;
+  std::string prisms_file;
+  double run_for_s = 0.0;
+  app.add_option("--prisms", prisms_file, "CSV prism,x_m,y_m,z_m[,constant_mm,vx_mm_per_s,..]")
+      ->required();
+  app.add_option("--address", options.address, "IPv4 address on this computer")
+      ->capture_default_str();
+  app.add_option(
+         "--port", options.tcp_port, "TCP port; 0: the system chooses, the first line tells")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 65535));
+  app.add_option(
+      "--serial-link", options.serial_link, "link to a serial port to be made, instead of TCP");
+  app.add_option("--seed", options.errors.seed, "of noise and faults")->capture_default_str();
+  app.add_option("--run-for", run_for_s, "end after so many seconds; 0: on a signal");
   tbm::AddStationOptions(app, options);
   try {
     app.parse(argc, argv);
@@ -26,44 +38,24 @@ int main(int argc, char** argv) {
   }
   tbm::HoldSignals();
   const tbm::SystemClock clock;
-  auto station = tbm::BuildStation(options, clock.Now());
-  if (!station) {
-    fmt::print(stderr, "{}", station.error());
+  const tbm::Timestamp start = clock.Now();
+  auto prisms = tbm::ReadPrisms(prisms_file, "prism", start);
+  if (!prisms) {
+    fmt::print(stderr, "{}\n", prisms.error());
     return kWrongCommand;
   }
-  const std::size_t prism_count = station->instrument.prisms.size();
-  tbm::GeocomEmulator emulator(station->emulator, station->instrument, clock);
-  unsigned seed = static_cast<unsigned>(options.errors.seed);
-  for (const auto& one : station->faults)
-    emulator.faults().AddLasting(one.fault, one.ratio, ++seed);
-
-  std::optional<tbm::TcpServer> tcp;
-  std::optional<tbm::PtyServer> pty;
-  if (options.serial_link.empty()) {
-    tcp.emplace(options.address, options.tcp_port, emulator);
-    if (!tcp->IsUp()) {
-      fmt::print(stderr,
-                 "total_station_sim: port {} of {} cannot be had: is the address one of this "
-                 "computer, and the port free?\n",
-                 options.tcp_port,
-                 options.address);
-      return kDevice;
-    }
-    fmt::print("total_station address={} port={} ", options.address, tcp->port());
-  } else {
-    pty.emplace(options.serial_link, emulator);
-    if (!pty->IsUp()) {
-      fmt::print(stderr,
-                 "{}: the link to a pseudo-terminal cannot be made: is its folder there and "
-                 "writable, and is no other file of that name in the way?\n",
-                 options.serial_link);
-      return kDevice;
-    }
-    fmt::print("total_station serial={} ", options.serial_link);
+  const auto station =
+      tbm::StationEmulator::Start(options, std::move(prisms).value(), start, clock);
+  if (!station) {
+    const bool is_link = station.error().failure == tbm::StationStartFailure::kLink;
+    fmt::print(stderr, "{}{}", is_link ? "total_station_sim: " : "", station.error().message);
+    if (is_link) fmt::print(stderr, "\n");
+    return is_link ? kDevice : kWrongCommand;
   }
-  fmt::print("prisms={} serial_number={}\nready\n", prism_count, options.emulator.serial_number);
+  fmt::print("{}\nready\n", (*station)->line());
   std::fflush(stdout);
-  tbm::WaitForEnd(options.run_for_s);
+  tbm::WaitForEnd(run_for_s);
+  tbm::GeocomEmulator& emulator = (*station)->emulator();
   fmt::print(
       "total_station requests={} faults={}\n", emulator.requests(), emulator.faults().taken());
   return kDone;

@@ -1,5 +1,6 @@
 #include "devices/app/truth_writer.h"
 
+#include <filesystem>
 #include <utility>
 
 #include <fmt/format.h>
@@ -35,11 +36,39 @@ const NamedPoint* Head(const Rig& rig) {
 
 }  // namespace
 
+TruthWriter::File TruthWriter::Open(const std::string& path) {
+  return File(path.empty() ? nullptr : std::fopen(path.c_str(), "w"));
+}
+
 TruthWriter::TruthWriter(const std::string& path, std::shared_ptr<const sim::World> world)
-    : world_(std::move(world)), file_(path.empty() ? nullptr : std::fopen(path.c_str(), "w")) {
+    : world_(std::move(world)), file_(Open(path)) {
   if (!file_) return;
   std::fputs("stamp_ns,qw,qx,qy,qz,tx_mm,ty_mm,tz_mm,head_x_mm,head_y_mm,head_z_mm,leds_visible\n",
              file_.get());
+  if (!world_->has_tunnel()) return;
+  const std::filesystem::path given(path);
+  shields_ =
+      Open(given.parent_path() / (given.stem().string() + "_shields" + given.extension().string()));
+  if (!shields_) return;
+  std::string header = "stamp_ns";
+  for (const char* shield : {"rear", "front"}) {
+    header += fmt::format(",{0}_qw,{0}_qx,{0}_qy,{0}_qz,{0}_x_m,{0}_y_m,{0}_z_m", shield);
+  }
+  std::fputs((header + "\n").c_str(), shields_.get());
+}
+
+void TruthWriter::WriteShields(Timestamp sensed_at) {
+  if (!shields_) return;
+  std::string row = fmt::format("{}", sensed_at.ns);
+  for (const Rigid3& site_from_shield :
+       {world_->SiteFromRearShield(sensed_at), world_->SiteFromFrontShield(sensed_at)}) {
+    const Eigen::Quaterniond& q = site_from_shield.rotation;
+    const Eigen::Vector3d& t = site_from_shield.translation;
+    row += fmt::format(",{:.12f},{:.12f},{:.12f},{:.12f}", q.w(), q.x(), q.y(), q.z());
+    row += fmt::format(",{:.7f},{:.7f},{:.7f}", t.x(), t.y(), t.z());
+  }
+  std::fputs((row + "\n").c_str(), shields_.get());
+  std::fflush(shields_.get());
 }
 
 void TruthWriter::Write(Timestamp sensed_at) {
@@ -65,6 +94,7 @@ void TruthWriter::Write(Timestamp sensed_at) {
   row += fmt::format(",{}\n", LedsInView(*world_, truth, sensed_at));
   std::fputs(row.c_str(), file_.get());
   std::fflush(file_.get());
+  WriteShields(sensed_at);
 }
 
 }  // namespace tbm

@@ -5,74 +5,72 @@
 #include <utility>
 
 #include "devices/sim/hash_noise.h"
+#include "pose/base/check.h"
 
 namespace tbm::sim {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
-double Phase(std::uint64_t seed, int channel, int part) {
-  return kTwoPi * UnitFrom(Mixed(Mixed(seed) ^ static_cast<std::uint64_t>(channel * 64 + part)));
-}
-
-enum Channel { kLateral, kVertical, kTurnX, kTurnY, kTurnZ, kLevelRoll, kLevelPitch, kShakeX };
-
 }  // namespace
 
-World::World(Rig rig, const Motion& motion, Faults faults, Timestamp begins_at, double speed)
+World::World(Rig rig,
+             const Motion& motion,
+             Faults faults,
+             Timestamp begins_at,
+             double speed,
+             std::optional<Tunnel> tunnel)
     : rig_(std::move(rig)),
       motion_(motion),
       faults_(std::move(faults)),
       begins_at_(begins_at),
-      speed_(speed) {}
-
-// Two sines whose periods have no common multiple, amplitudes summing to one. Starts anywhere.
-double World::Wander(int channel, double t_s) const {
-  const double slow = kTwoPi * t_s / motion_.steer_period_s;
-  return 0.7 * std::sin(slow + Phase(motion_.seed, channel, 0)) +
-         0.3 * std::sin(2.618 * slow + Phase(motion_.seed, channel, 1));
+      speed_(speed) {
+  if (tunnel) drive_.emplace(std::move(*tunnel), motion);
 }
 
-// Unit rms.
-double World::Vibration(int channel, double t_s) const {
-  double sum = 0.0;
-  for (int part = 0; part < 3; ++part) {
-    const double hz = motion_.vibration_hz * (0.83 + 0.19 * part + 0.013 * channel);
-    sum += std::sin(kTwoPi * hz * t_s + Phase(motion_.seed, channel, 2 + part));
-  }
-  return sum * std::sqrt(2.0 / 3.0);
+double World::Wandered(int channel, double t_s) const {
+  return Wander(motion_.seed, channel, kTwoPi * t_s / motion_.steer_period_s);
 }
 
-// Forward through one stroke at the advance rate, back at ten times that, and again.
-double World::Advance(double t_s) const {
-  if (motion_.advance_m_per_s <= 0.0 || motion_.stroke_m <= 0.0 || t_s < 0.0) return 0.0;
-  const double push_s = motion_.stroke_m / motion_.advance_m_per_s;
-  const double pull_s = push_s / 10.0;
-  const double in_cycle_s = std::fmod(t_s, push_s + pull_s);
-  if (in_cycle_s < push_s) return motion_.advance_m_per_s * in_cycle_s;
-  return motion_.stroke_m * (1.0 - (in_cycle_s - push_s) / pull_s);
+Rigid3 World::SiteFromRearShield(Timestamp when) const {
+  TBM_CHECK(drive_.has_value());
+  return drive_->SiteFromRearShield(SecondsAt(when));
+}
+
+Rigid3 World::SiteFromFrontShield(Timestamp when) const {
+  TBM_CHECK(drive_.has_value());
+  return drive_->SiteFromFrontShield(SecondsAt(when));
+}
+
+WorldState World::InTunnel(double t_s) const {
+  const Tunnel& tunnel = drive_->tunnel();
+  const Rigid3 camera_from_site =
+      Inverse(drive_->SiteFromRearShield(t_s) * tunnel.rear_shield_from_camera);
+  return {camera_from_site * drive_->SiteFromFrontShield(t_s) * tunnel.front_shield_from_target,
+          camera_from_site.rotation * Eigen::Vector3d::UnitZ()};
 }
 
 WorldState World::At(Timestamp when) const {
   const double t_s = SecondsAt(when);
+  if (drive_) return InTunnel(t_s);
   // The target faces the camera: its x to the image's right, its y up, its z towards the camera.
   const Eigen::Quaterniond facing(0.0, 1.0, 0.0, 0.0);
 
   Eigen::Vector3d turn_rad =
       motion_.steer_angle_rad *
-      Eigen::Vector3d(Wander(kTurnX, t_s), Wander(kTurnY, t_s), Wander(kTurnZ, t_s));
-  Eigen::Vector3d shift_m(motion_.steer_m * Wander(kLateral, t_s),
-                          motion_.steer_m * Wander(kVertical, t_s),
-                          motion_.start_distance_m + Advance(t_s));
+      Eigen::Vector3d(Wandered(kTurnX, t_s), Wandered(kTurnY, t_s), Wandered(kTurnZ, t_s));
+  Eigen::Vector3d shift_m(motion_.steer_m * Wandered(kLateral, t_s),
+                          motion_.steer_m * Wandered(kVertical, t_s),
+                          motion_.start_distance_m + StrokeAt(motion_, t_s).open_m);
   for (int axis = 0; axis < 3; ++axis) {
-    turn_rad[axis] += motion_.vibration_rad * Vibration(kShakeX + axis, t_s);
-    shift_m[axis] += motion_.vibration_m * Vibration(kShakeX + 3 + axis, t_s);
+    turn_rad[axis] += motion_.vibration_rad * Vibration(motion_, kShakeX + axis, t_s);
+    shift_m[axis] += motion_.vibration_m * Vibration(motion_, kShakeX + 3 + axis, t_s);
   }
 
   // Camera axes: x right, y down, z forward. Roll turns about z, pitch about x.
   const Eigen::Quaterniond level_from_camera =
-      ExpRotation({motion_.level_angle_rad * Wander(kLevelPitch, t_s), 0.0, 0.0}) *
-      ExpRotation({0.0, 0.0, motion_.level_angle_rad * Wander(kLevelRoll, t_s)});
+      ExpRotation({motion_.level_angle_rad * Wandered(kLevelPitch, t_s), 0.0, 0.0}) *
+      ExpRotation({0.0, 0.0, motion_.level_angle_rad * Wandered(kLevelRoll, t_s)});
   return {{(ExpRotation(turn_rad) * facing).normalized(), shift_m},
           level_from_camera.conjugate() * -Eigen::Vector3d::UnitY()};
 }

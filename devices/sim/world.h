@@ -1,33 +1,18 @@
 #pragma once
 
-#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "devices/sim/drive.h"
+#include "devices/sim/motion.h"
 #include "pose/base/time.h"
 #include "pose/geometry/rigid3.h"
 #include "pose/geometry/tilt.h"
 #include "pose/rig/rig.h"
 
 namespace tbm::sim {
-
-// How the two shields move against each other and against level while the machine advances. All of
-// it is smooth; vibration is a sum of three sines near vibration_hz.
-struct Motion {
-  std::uint64_t seed = 1;
-  double start_distance_m = 3.2;   // camera to target when the world begins
-  double stroke_m = 1.2;           // the front shield advances by this, then is pulled after
-  double advance_m_per_s = 0.001;  // 60 mm/min
-  double steer_m = 0.03;           // +- lateral and vertical wander of the target
-  double steer_angle_rad = 0.015;  // +- of each axis, relative rotation
-  double level_angle_rad = 0.02;   // +- roll and pitch of the rear shield against level
-  double steer_period_s = 240.0;
-  double vibration_m = 0.00005;  // of the target against the camera, rms of each axis
-  double vibration_rad = 0.00002;
-  double vibration_hz = 17.0;
-  double tilt_noise_factor = 1.0;  // times the rig's sigma; 0 for noise-free tilts
-};
 
 // A window of world time, in seconds since it began.
 struct Window {
@@ -85,10 +70,22 @@ struct WorldState {
 // what is broken, each a pure function of time. Immutable, so any number of threads may ask.
 class World {
  public:
-  // World time is zero at `begins_at` and runs `speed` times as fast as the clock.
-  World(Rig rig, const Motion& motion, Faults faults, Timestamp begins_at, double speed = 1.0);
+  // World time is zero at `begins_at` and runs `speed` times as fast as the clock. With a tunnel
+  // the machine has a place in `site`, and the camera sees what follows from it; without, camera
+  // and board wander against each other as `motion` says.
+  World(Rig rig,
+        const Motion& motion,
+        Faults faults,
+        Timestamp begins_at,
+        double speed = 1.0,
+        std::optional<Tunnel> tunnel = {});
 
   WorldState At(Timestamp when) const;
+
+  // Where both shields are; only of a world with a tunnel.
+  bool has_tunnel() const { return drive_.has_value(); }
+  Rigid3 SiteFromRearShield(Timestamp when) const;
+  Rigid3 SiteFromFrontShield(Timestamp when) const;
 
   // What an inclinometer puts on its wire at `when`: with noise, faults, and in the instrument's
   // own sign convention (the rig's `sign` taken back out).
@@ -100,16 +97,15 @@ class World {
   double SecondsAt(Timestamp when) const { return SecondsBetween(begins_at_, when) * speed_; }
 
  private:
-  // A smooth wander between -1 and 1, different for every channel.
-  double Wander(int channel, double t_s) const;
-  double Vibration(int channel, double t_s) const;
-  double Advance(double t_s) const;
+  WorldState InTunnel(double t_s) const;
+  double Wandered(int channel, double t_s) const;
 
   Rig rig_;
   Motion motion_;
   Faults faults_;
   Timestamp begins_at_;
   double speed_;
+  std::optional<Drive> drive_;
 };
 
 }  // namespace tbm::sim
