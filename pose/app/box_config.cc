@@ -1,10 +1,10 @@
 #include "pose/app/box_config.h"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
 
 #include "pose/base/angle.h"
 #include "pose/rig/rig_yaml.h"
+#include "pose/rig/dds_section.h"
 #include "pose/rig/yaml_section.h"
 
 namespace tbm {
@@ -36,7 +36,7 @@ class Reader {
     ReadCamera(section.Require("camera", "a map with driver: gige | sim | replay"), &config);
     ReadInclinometers(section.Require("inclinometers", "a map with target and camera"), &config);
     ReadSolver(section.Know("solver"), &config);
-    ReadDds(section.Know("dds"), &config);
+    ReadDdsSection(section.Know("dds"), &config.dds);
     ReadRecording(section.Know("recording"), &config);
     section.RefuseOthers();
     return config;
@@ -192,25 +192,6 @@ class Reader {
     solver.motion_sigma_rad_per_s = DegToRad(turn_deg_per_s);
     section.Time("prior_max_age_ms", 0.0, 600'000.0, &solver.prior_max_age);
     section.RefuseOthers();
-  }
-
-  void ReadDds(const YamlNode& node, BoxConfig* config) {
-    if (!IsSection(node)) return;
-    YamlSection section(node);
-    section.Integer("domain", 0, 232, &config->dds.domain);
-    section.Texts("interfaces", &config->dds.interfaces);
-    section.Texts("initial_peers", &config->dds.initial_peers);
-    section.RefuseOthers();
-    if (config->dds.interfaces.empty()) {
-      node.Fault("interfaces: empty; name at least one address of this computer, e.g. [127.0.0.1]");
-    }
-    for (const auto* list : {&config->dds.interfaces, &config->dds.initial_peers}) {
-      for (const std::string& address : *list) {
-        in_addr parsed{};
-        if (inet_pton(AF_INET, address.c_str(), &parsed) == 1) continue;
-        node.Fault(fmt::format("'{}' is not an IPv4 address such as 127.0.0.1", address));
-      }
-    }
   }
 
   void ReadRecording(const YamlNode& node, BoxConfig* config) {

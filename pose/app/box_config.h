@@ -10,16 +10,10 @@
 #include "devices/inclinometer/inclinometer_config.h"
 #include "pose/base/result.h"
 #include "pose/frame/frame_solver.h"
+#include "pose/rig/dds_section.h"
 #include "pose/rig/rig_file.h"
 
 namespace tbm {
-
-// How the box speaks DDS. Mirrors idl/cpp's options so that configuration is readable without DDS.
-struct BoxDdsConfig {
-  int domain = 25;
-  std::vector<std::string> interfaces = {"127.0.0.1"};  // IPv4 addresses; nothing else is used
-  std::vector<std::string> initial_peers;               // for networks without multicast
-};
 
 struct BoxRecordingConfig {
   std::string folder;  // empty: no recording
@@ -38,7 +32,7 @@ struct BoxConfig {
   // How long a frame waits for inclinometer readings that are younger than its exposure.
   std::chrono::milliseconds tilt_wait{60};
   bool exposure_control = true;
-  BoxDdsConfig dds;
+  DdsNetwork dds;
   BoxRecordingConfig recording;
 };
 

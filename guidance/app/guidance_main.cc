@@ -1,0 +1,136 @@
+#include <cstdio>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <signal.h>
+
+#include "devices/app/end_signals.h"
+#include "guidance/app/exit_code.h"
+#include "guidance/app/guidance_config.h"
+#include "guidance/app/guidance_process.h"
+#include "idl/cpp/participant.h"
+#include "pose/app/service_manager.h"
+#include "pose/base/clock.h"
+
+namespace tbm {
+namespace {
+
+dds::ParticipantConfig ParticipantOf(const DdsNetwork& network, const std::string& machine_id) {
+  dds::ParticipantConfig config;
+  config.domain_id = network.domain;
+  config.name = "guidance " + machine_id;
+  config.interfaces = network.interfaces;
+  config.peers = network.initial_peers;
+  return config;
+}
+
+void Print(const std::vector<std::string>& lines) {
+  for (const std::string& line : lines) fmt::print(stderr, "{}\n", line);
+}
+
+int Main(const std::string& config_file, bool check_only) {
+  const auto config = LoadGuidanceConfig(config_file);
+  if (!config) {
+    for (const RigFileFault& fault : config.error()) fmt::print(stderr, "{}\n", fault.Text());
+    return static_cast<int>(ExitCode::kBadInput);
+  }
+  MachineFaults warnings;
+  const auto machine = LoadGuidedMachine(config->machine_file, &warnings);
+  Print(warnings);
+  if (!machine) {
+    Print(machine.error());
+    return static_cast<int>(ExitCode::kBadInput);
+  }
+  const auto participant_config = ParticipantOf(config->dds, machine->machine.machine_id);
+  const auto problems = dds::Problems(participant_config);
+  for (const std::string& problem : problems) {
+    fmt::print(stderr, "{}: dds: {}\n", config_file, problem);
+  }
+  if (!problems.empty()) return static_cast<int>(ExitCode::kBadInput);
+  if (check_only) {
+    fmt::print("{}: good; machine {} with {} prisms, axis '{}' from {:.3f} m to {:.3f} m\n",
+               config_file,
+               machine->machine.machine_id,
+               machine->machine.prisms.size(),
+               machine->axis.name(),
+               machine->axis.start().m,
+               machine->axis.end().m);
+    return static_cast<int>(ExitCode::kDone);
+  }
+
+  HoldSignals();
+  signal(SIGPIPE, SIG_IGN);
+  const SystemClock clock;
+  std::mutex alarm_mutex;  // guards the two below
+  GuidanceProcess* process_for_alarms = nullptr;
+  std::vector<dds::Alarm> early_alarms;
+  dds::Participant participant(
+      participant_config,
+      [&](const dds::Alarm& alarm) {
+        const std::lock_guard lock(alarm_mutex);
+        if (process_for_alarms != nullptr) {
+          process_for_alarms->Report(alarm);
+        } else {
+          early_alarms.push_back(alarm);
+        }
+      },
+      [](dds::LogLevel level, std::string_view category, std::string_view text) {
+        fmt::print(stderr,
+                   "source=fastdds severity={} category={} text=\"{}\"\n",
+                   level == dds::LogLevel::kError ? "error" : "warning",
+                   category,
+                   text);
+      });
+  GuidanceProcess process(*config, *machine, participant, clock);
+  {
+    const std::lock_guard lock(alarm_mutex);
+    process_for_alarms = &process;
+    for (const dds::Alarm& alarm : early_alarms) process.Report(alarm);
+  }
+  fmt::print(stderr,
+             "source=guidance code=started version={} machine_id={} domain={} axis_sha256={}\n",
+             TBM_VERSION,
+             machine->machine.machine_id,
+             config->dds.domain,
+             machine->axis.file_sha256());
+  std::stop_source stop;
+  std::thread ending([&stop] {
+    WaitForEnd(0.0);
+    stop.request_stop();
+  });
+  ServiceManager manager(clock);
+  process.Run(stop.get_token(), [&manager] { manager.TellAlive(); });
+  manager.TellStopping();
+  ending.join();
+  {
+    const std::lock_guard lock(alarm_mutex);
+    process_for_alarms = nullptr;
+  }
+  fmt::print(stderr, "source=guidance code=ended\n");
+  return static_cast<int>(ExitCode::kDone);
+}
+
+}  // namespace
+}  // namespace tbm
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Guidance: from total station, camera box and inclinometers to the machine's deviation from "
+      "the design axis, on DDS and in a journal.",
+      "guidance");
+  std::string config_file;
+  bool check_only = false;
+  app.add_option("config", config_file, "guidance.yaml")->required();
+  app.add_flag("--check", check_only, "read all files, report every fault, and end");
+  app.set_version_flag("--version", std::string(TBM_VERSION));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return static_cast<int>(app.exit(error) == 0 ? tbm::ExitCode::kDone : tbm::ExitCode::kBadInput);
+  }
+  return tbm::Main(config_file, check_only);
+}
