@@ -10,7 +10,7 @@
 
 #include "devices/app/end_signals.h"
 #include "guidance/app/exit_code.h"
-#include "guidance/app/guidance_config.h"
+#include "guidance/config/guidance_file.h"
 #include "guidance/app/guidance_process.h"
 #include "idl/cpp/participant.h"
 #include "pose/app/service_manager.h"

@@ -4,7 +4,7 @@
 #include <memory>
 #include <stop_token>
 
-#include "guidance/app/guidance_config.h"
+#include "guidance/config/guidance_file.h"
 #include "idl/cpp/participant.h"
 #include "pose/base/clock.h"
 

@@ -1,4 +1,4 @@
-#include "guidance/app/guidance_config.h"
+#include "guidance/config/guidance_file.h"
 
 #include <utility>
 
