@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "guidance/app/csv_field.h"
 #include "guidance/app/output_file.h"
 #include "pose/base/angle.h"
 
@@ -221,17 +222,6 @@ std::string_view ReasonText(AxisFailure failure) {
 constexpr std::string_view kProjectHeader =
     "point,status,reason,chainage_m,official_m,official_section,deviation_right_mm,deviation_up_mm,"
     "bearing_deg,gradient_mm_per_m,other_chainage_m,axis_sha256\n";
-
-// A name as a field: in quotes when it would not be one otherwise.
-std::string CsvField(std::string_view text) {
-  if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
-  std::string field = "\"";
-  for (const char c : text) {
-    field += c;
-    if (c == '"') field += c;
-  }
-  return field + "\"";
-}
 
 std::string ProjectRow(std::string_view name,
                        const Result<AxisPosition, AxisFailure>& position,

@@ -9,8 +9,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "devices/replay/synced_file.h"
-
 namespace tbm {
 namespace {
 
@@ -44,29 +42,52 @@ std::optional<std::string> OutputFile::Write(std::string_view bytes) const {
     std::cout << bytes << std::flush;
     return std::cout ? std::nullopt : std::optional<std::string>("the output cannot be written");
   }
-  const std::string beside = fmt::format("{}.part{}", path_, ::getpid());
-  SyncedFile file;
-  int error = file.Create(beside);
-  if (error == 0) error = file.Append(bytes);
-  if (error == 0) error = file.Sync();
-  file.Close();
+  GrowingOutputFile file(path_, may_replace_);
+  if (const auto fault = file.Append(bytes)) return fault;
+  return file.Commit();
+}
+
+GrowingOutputFile::GrowingOutputFile(std::string path, bool may_replace)
+    : path_(std::move(path)),
+      beside_(fmt::format("{}.part{}", path_, ::getpid())),
+      may_replace_(may_replace) {}
+
+GrowingOutputFile::~GrowingOutputFile() {
+  if (file_.is_open()) ::unlink(beside_.c_str());
+}
+
+std::optional<std::string> GrowingOutputFile::Told(int error) const {
+  if (error == 0) return std::nullopt;
+  if (error == EEXIST) return ExistsText(path_);
+  return fmt::format("{}: cannot be written: {}", path_, std::strerror(error));
+}
+
+std::optional<std::string> GrowingOutputFile::Append(std::string_view bytes) {
+  if (!file_.is_open()) {
+    if (const int error = file_.Create(beside_); error != 0) return Told(error);
+  }
+  return Told(file_.Append(bytes));
+}
+
+std::optional<std::string> GrowingOutputFile::Commit() {
+  if (const auto fault = Append({})) return fault;
+  int error = file_.Sync();
+  file_.Close();
   if (error == 0 && may_replace_) {
-    if (std::rename(beside.c_str(), path_.c_str()) != 0) error = errno;
+    if (std::rename(beside_.c_str(), path_.c_str()) != 0) error = errno;
   } else if (error == 0) {
     // link() refuses an existing name in the same step; rename() would replace what somebody else
     // wrote while we were computing. Disks without links (vfat) get the two steps.
-    if (::link(beside.c_str(), path_.c_str()) != 0) {
+    if (::link(beside_.c_str(), path_.c_str()) != 0) {
       error = errno;
       std::error_code ignored;
       if ((error == EPERM || error == ENOTSUP) && !fs::exists(path_, ignored)) {
-        error = std::rename(beside.c_str(), path_.c_str()) == 0 ? 0 : errno;
+        error = std::rename(beside_.c_str(), path_.c_str()) == 0 ? 0 : errno;
       }
     }
   }
-  ::unlink(beside.c_str());
-  if (error == EEXIST) return ExistsText(path_);
-  if (error != 0) return fmt::format("{}: cannot be written: {}", path_, std::strerror(error));
-  return std::nullopt;
+  ::unlink(beside_.c_str());
+  return Told(error);
 }
 
 std::optional<std::string> MakeFolder(const std::string& path) {

@@ -4,6 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "devices/replay/synced_file.h"
+
 namespace tbm {
 
 // A result file that appears under its name only when whole, and never over an existing one unless
@@ -24,6 +26,29 @@ class OutputFile {
  private:
   std::string path_;
   bool may_replace_;
+};
+
+// The same for a file that is too long to be held in memory: it grows beside its name, and gets the
+// name in the end.
+class GrowingOutputFile {
+ public:
+  GrowingOutputFile(std::string path, bool may_replace);
+  // Without Commit nothing stays behind.
+  ~GrowingOutputFile();
+  GrowingOutputFile(const GrowingOutputFile&) = delete;
+  GrowingOutputFile& operator=(const GrowingOutputFile&) = delete;
+
+  // Each: empty when done, else what went wrong.
+  std::optional<std::string> Append(std::string_view bytes);
+  std::optional<std::string> Commit();
+
+ private:
+  std::optional<std::string> Told(int error) const;
+
+  std::string path_;
+  std::string beside_;
+  bool may_replace_;
+  SyncedFile file_;
 };
 
 // Makes a folder for several results. Empty when it is there afterwards.

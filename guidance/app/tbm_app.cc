@@ -11,6 +11,7 @@
 #include "guidance/app/axis_options.h"
 #include "guidance/app/check_command.h"
 #include "guidance/app/completion.h"
+#include "guidance/app/journal_options.h"
 #include "guidance/app/solve_command.h"
 #include "guidance/app/study_command.h"
 #include "guidance/app/watch_command.h"
@@ -33,6 +34,8 @@ constexpr const char* kExamples =
     "      what is odd in the file of a design axis; eval, project and plot work on it\n"
     "  tbm watch\n"
     "      the live values of a running camera box\n"
+    "  tbm record --out journal; tbm export journal --out tables\n"
+    "      everything that is published, kept as MCAP files, and as tables\n"
     "\n"
     "Exit codes: 0 done, 2 command line or file wrong, 3 device, 4 DDS, 70 mistake of the "
     "program.\n"
@@ -124,6 +127,7 @@ struct Requests {
   StudyRequest study;
   WatchRequest watch;
   AxisRequests axis;
+  JournalRequests journal;
   std::string align = "none";
   std::string format = "csv";
   std::string method = "fused";
@@ -246,6 +250,9 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   const CLI::App* axis = AddAxis(app, requests.axis);
   const CLI::App* study = AddStudy(app, requests);
   const CLI::App* watch = AddWatch(app, requests);
+  const CLI::App* record = AddRecord(app, requests.journal);
+  const CLI::App* exported = AddExport(app, requests.journal);
+  const CLI::App* repair = AddRepair(app, requests.journal);
   const CLI::App* completion = AddCompletion(app, requests);
 
   std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
@@ -258,6 +265,7 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   }
   requests.solve.method = kMethods.at(requests.method);
   requests.solve.as_json = requests.format == "json";
+  requests.journal.record.program = requests.journal.repair.program = "tbm " TBM_VERSION;
   requests.check.align_rigid = requests.align == "rigid";
   if (solve->parsed()) return RunSolve(requests.solve, console);
   if (centres->parsed()) return RunCentres(requests.centres, console);
@@ -265,6 +273,9 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   if (axis->parsed()) return RunAxis(*axis, requests.axis, console);
   if (study->parsed()) return RunStudy(requests.study, console);
   if (watch->parsed()) return RunWatch(requests.watch, console);
+  if (record->parsed()) return RunRecord(requests.journal.record, console);
+  if (exported->parsed()) return RunExport(requests.journal.exported, console);
+  if (repair->parsed()) return RunRepair(requests.journal.repair, console);
   if (completion->parsed()) {
     console.out << (requests.shell == "bash" ? BashCompletion(app) : ZshCompletion(app));
   }

@@ -78,18 +78,22 @@ std::uint16_t McapWriter::AddChannel(std::string_view topic,
                                      std::string_view message_encoding,
                                      const McapSchema& schema) {
   TBM_CHECK(channel_count_ < std::numeric_limits<std::uint16_t>::max());
-  // Zero is no schema's number; each channel brings its own.
   const auto id = static_cast<std::uint16_t>(++channel_count_);
   Bytes content;
+  // Zero is no schema's number: it says that there is none. Each channel brings its own.
+  const bool has_schema = schema != McapSchema{};
+  if (has_schema) {
+    Put(content, id);
+    PutText(content, schema.name);
+    PutText(content, schema.encoding);
+    PutText(content, schema.text);
+    PutRecord(schemas_, Op::kSchema, content);
+    PutRecord(pending_, Op::kSchema, content);
+    content.clear();
+    ++schema_count_;
+  }
   Put(content, id);
-  PutText(content, schema.name);
-  PutText(content, schema.encoding);
-  PutText(content, schema.text);
-  PutRecord(schemas_, Op::kSchema, content);
-  PutRecord(pending_, Op::kSchema, content);
-  content.clear();
-  Put(content, id);
-  Put(content, id);  // its schema
+  Put(content, has_schema ? id : std::uint16_t{0});
   PutText(content, topic);
   PutText(content, message_encoding);
   Put(content, std::uint32_t{0});  // no metadata
@@ -206,7 +210,7 @@ Bytes McapWriter::End() {
   Bytes statistics;
   content.clear();
   Put(content, messages);
-  Put(content, channel_count_);  // schemas
+  Put(content, schema_count_);
   Put(content, std::uint32_t{channel_count_});
   Put(content, std::uint32_t{0});  // attachments
   Put(content, std::uint32_t{0});  // metadata

@@ -29,7 +29,8 @@ class McapWriter {
   // Magic and header: the first bytes of the file. Once, before anything else.
   Bytes Begin();
 
-  // A channel for `topic`; one for each call. Its records go out with the next chunk.
+  // A channel for `topic`; one for each call. Its records go out with the next chunk. An empty
+  // schema is none.
   std::uint16_t AddChannel(std::string_view topic,
                            std::string_view message_encoding,
                            const McapSchema& schema);
@@ -71,6 +72,7 @@ class McapWriter {
   Bytes channels_;
   Bytes pending_;  // records that have not been handed out
   std::uint16_t channel_count_ = 0;
+  std::uint16_t schema_count_ = 0;
   Bytes chunk_;
   std::uint64_t chunk_first_time_ = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t chunk_last_time_ = 0;
