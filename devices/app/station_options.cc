@@ -271,6 +271,8 @@ Result<std::vector<SimulatedPrism>, std::string> ReadPrisms(const std::string& p
     if (!number && !fault) fault = number.error();
     return number ? *number : 0.0;
   };
+  const std::string_view constant =
+      table->Column("prism_constant_mm") ? "prism_constant_mm" : "constant_mm";
   std::vector<SimulatedPrism> prisms;
   for (std::size_t row = 0; row < table->row_count(); ++row) {
     const Eigen::Vector3d p_in_site(value(row, "x_m"), value(row, "y_m"), value(row, "z_m"));
@@ -281,7 +283,7 @@ Result<std::vector<SimulatedPrism>, std::string> ReadPrisms(const std::string& p
                       [=](Timestamp at) -> Eigen::Vector3d {
                         return p_in_site + SecondsBetween(start, at) * velocity_m_per_s;
                       },
-                      value(row, "constant_mm") * 1e-3});
+                      value(row, constant) * 1e-3});
   }
   if (fault) return Failure{fault->Text()};
   return prisms;

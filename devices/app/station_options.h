@@ -57,8 +57,9 @@ struct SimulatedPrism {
   double constant_m = 0.0;  // what has to be added to a raw distance
 };
 
-// The prisms of a CSV: `name_column`,x_m,y_m,z_m in `site`; optional constant_mm and vx_mm_per_s,
-// vy_mm_per_s, vz_mm_per_s. They stand there at `start`.
+// The prisms of a CSV: `name_column`,x_m,y_m,z_m in `site`; optional constant_mm (or, as
+// in a table of references, prism_constant_mm) and vx_mm_per_s, vy_mm_per_s, vz_mm_per_s. They
+// stand there at `start`.
 Result<std::vector<SimulatedPrism>, std::string> ReadPrisms(const std::string& path,
                                                             std::string_view name_column,
                                                             Timestamp start);
