@@ -1,0 +1,365 @@
+#include "guidance/core/guidance_core.h"
+
+#include <cmath>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/drive.h"
+#include "tests/support/no_alloc.h"
+
+namespace tbm::test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+const GuidedMachine& TheMachine() {
+  static const GuidedMachine machine = ExampleMachine();
+  return machine;
+}
+
+std::vector<GuidanceInput> Later(std::vector<GuidanceInput> inputs, Duration by) {
+  for (GuidanceInput& input : inputs) {
+    std::visit(
+        [&](auto& one) {
+          if constexpr (requires { one.sensed_at; }) one.sensed_at = one.sensed_at + by;
+        },
+        input);
+  }
+  return inputs;
+}
+template <class Kind>
+std::vector<GuidanceInput> Only(const std::vector<GuidanceInput>& inputs) {
+  std::vector<GuidanceInput> some;
+  for (const GuidanceInput& input : inputs) {
+    if (std::holds_alternative<Kind>(input)) some.push_back(input);
+  }
+  return some;
+}
+template <class Kind>
+std::vector<GuidanceInput> Without(const std::vector<GuidanceInput>& inputs) {
+  std::vector<GuidanceInput> some;
+  for (const GuidanceInput& input : inputs) {
+    if (!std::holds_alternative<Kind>(input)) some.push_back(input);
+  }
+  return some;
+}
+
+// A machine that stands still: one round of readings, and the core that got it.
+class Core : public testing::Test {
+ protected:
+  Core() : drive_(TheMachine(), {}, "guidance core") {
+    drive_.Measure(2100.0);
+    round_ = drive_.inputs();
+    at_ = drive_.now();
+  }
+
+  const Snapshot& Begin() { return core_.Advance(round_, at_); }
+  // What keeps coming while one source is silent.
+  const Snapshot& CameraGoesOn(Duration after) {
+    const auto live = Without<SetUpKnown>(Without<PrismSeen>(round_));
+    return core_.Advance(Later(live, after), at_ + after);
+  }
+  const Snapshot& StationGoesOn(Duration after) {
+    return core_.Advance(Later(Without<RelativeSeen>(round_), after), at_ + after);
+  }
+  const PointState& Cutter() const {
+    return core_.snapshot().points[TheMachine().machine.steer_by];
+  }
+  AlarmState StateOf(GuidanceAlarm alarm) const {
+    return core_.alarms().alarm(static_cast<std::size_t>(alarm)).state;
+  }
+  void Answer(GuidanceAlarm alarm, Timestamp now) {
+    core_.Advance(std::vector<GuidanceInput>{AlarmAnswered{static_cast<std::size_t>(alarm)}}, now);
+  }
+
+  Drive drive_;
+  std::vector<GuidanceInput> round_;
+  Timestamp at_;
+  GuidanceCore core_{TheMachine().machine, TheMachine().rig, TheMachine().axis};
+};
+
+TEST_F(Core, StartsWithNothingAndSaysWhatIsMissing) {
+  const Snapshot& snapshot = core_.Advance({}, at_);
+  EXPECT_EQ(snapshot.rear.worth, Worth::kInvalid);
+  EXPECT_EQ(snapshot.rear.reason, GuidanceReason::kNoSetUp);
+  EXPECT_EQ(snapshot.front.reason, GuidanceReason::kNoRelativePose);
+  EXPECT_EQ(Cutter().worth, Worth::kInvalid);
+  EXPECT_EQ(snapshot.station.freshness, Freshness::kMissing);
+  EXPECT_FALSE(snapshot.station.age_s);
+  EXPECT_FALSE(snapshot.lead || snapshot.joint || snapshot.ring_number || snapshot.fix);
+  EXPECT_TRUE(snapshot.ahead.empty());
+  core_.Advance({}, at_ + seconds(3));
+  EXPECT_EQ(StateOf(GuidanceAlarm::kPositionLost), AlarmState::kUnacknowledged);
+  EXPECT_EQ(StateOf(GuidanceAlarm::kSetUpNotGood), AlarmState::kUnacknowledged);
+  EXPECT_EQ(StateOf(GuidanceAlarm::kDeviationHigh), AlarmState::kNormal);
+}
+
+TEST_F(Core, WithAllSourcesEveryNumberIsValid) {
+  const Snapshot& snapshot = Begin();
+  EXPECT_EQ(snapshot.rear.worth, Worth::kValid);
+  EXPECT_EQ(snapshot.front.worth, Worth::kValid);
+  for (const PointState& point : snapshot.points) EXPECT_EQ(point.worth, Worth::kValid);
+  ASSERT_TRUE(snapshot.lead && snapshot.joint && snapshot.ring_number);
+  EXPECT_EQ(snapshot.fix->prisms_used, 4);
+  // 2100 m is the cutter's place; the rear shield's datum is 7 to 8 m behind, rings are 1.5 m.
+  EXPECT_NEAR(static_cast<double>(*snapshot.ring_number), 1.0 + std::floor(92.5 / 1.5), 1.0);
+  EXPECT_GE(*snapshot.joint->stroke_m, -0.01);
+  EXPECT_LE(*snapshot.joint->stroke_m, 1.21);
+  EXPECT_EQ(snapshot.ahead.size(), 20u);
+  // What may happen on the way only grows.
+  for (std::size_t i = 1; i < snapshot.ahead.size(); ++i) {
+    EXPECT_GT(snapshot.ahead[i].right.sigma_m, snapshot.ahead[i - 1].right.sigma_m);
+  }
+}
+
+TEST_F(Core, WithTheStationBlockedTheNumbersCoastSaySoAndThenEnd) {
+  Begin();
+  const double fresh_m = Cutter().deviation.right_sigma_m;
+  CameraGoesOn(seconds(45));
+  EXPECT_EQ(Cutter().worth, Worth::kValid);  // within two periods of the station
+  CameraGoesOn(seconds(240));
+  EXPECT_EQ(core_.snapshot().station.freshness, Freshness::kCoasting);
+  EXPECT_EQ(Cutter().worth, Worth::kDegraded);
+  EXPECT_EQ(Cutter().reason, GuidanceReason::kStationCoasting);
+  EXPECT_NEAR(core_.snapshot().rear.age_s, 240.0, 30.0);
+  // The law of guidance/shield/coast.h: 0.02 mm/s across at the rear shield's datum, and 0.8
+  // microrad/s of turning over the 8 m to the cutter.
+  const double age_s = core_.snapshot().rear.age_s;
+  const double lever_m =
+      (Cutter().p_in_site.p - core_.snapshot().rear.site_from_shield.b_from_a.translation).norm();
+  const double grown_m = std::sqrt(fresh_m * fresh_m + std::pow(2e-5 * age_s, 2) +
+                                   std::pow(8e-7 * age_s * lever_m, 2));
+  EXPECT_NEAR(Cutter().deviation.right_sigma_m / grown_m, 1.0, 0.05);
+  CameraGoesOn(seconds(800));
+  EXPECT_EQ(Cutter().worth, Worth::kDegraded);
+  CameraGoesOn(seconds(930));
+  EXPECT_EQ(core_.snapshot().station.freshness, Freshness::kStale);
+  EXPECT_EQ(Cutter().worth, Worth::kInvalid);
+  EXPECT_EQ(Cutter().reason, GuidanceReason::kStationStale);
+  EXPECT_FALSE(core_.snapshot().lead);
+  EXPECT_TRUE(core_.snapshot().ahead.empty());
+}
+
+TEST_F(Core, WithTheCameraDirtyTheFrontShieldCoastsAndThenEnds) {
+  Begin();
+  StationGoesOn(seconds(20));
+  EXPECT_EQ(core_.snapshot().rear.worth, Worth::kValid);
+  EXPECT_EQ(core_.snapshot().front.worth, Worth::kDegraded);
+  EXPECT_EQ(core_.snapshot().front.reason, GuidanceReason::kCameraCoasting);
+  EXPECT_NEAR(core_.snapshot().front.age_s, 20.0, 0.5);
+  EXPECT_FALSE(core_.snapshot().joint);  // nothing is seen of the joint now
+  StationGoesOn(seconds(130));
+  EXPECT_EQ(core_.snapshot().front.worth, Worth::kInvalid);
+  EXPECT_EQ(core_.snapshot().front.reason, GuidanceReason::kCameraStale);
+  EXPECT_EQ(core_.snapshot().rear.worth, Worth::kValid);
+}
+
+TEST_F(Core, AFrameWithoutAPoseIsNoPoseAndItsReasonIsTold) {
+  Begin();
+  RelativeSeen nothing;
+  nothing.sensed_at = at_ + milliseconds(300);
+  nothing.reason = PoseReason::kTooFewLeds;
+  core_.Advance(std::vector<GuidanceInput>{nothing}, at_ + milliseconds(400));
+  EXPECT_EQ(core_.snapshot().camera_trouble, PoseReason::kTooFewLeds);
+  EXPECT_EQ(core_.snapshot().front.worth, Worth::kValid);  // the last one is half a second old
+  EXPECT_LT(core_.snapshot().valid_at, nothing.sensed_at);
+}
+
+TEST_F(Core, WhatWasSeenSinceTheLastGoodCheckIsNotUsedWhenTheStationIsSuspect) {
+  Begin();
+  const Eigen::Vector3d before = core_.snapshot().rear.site_from_shield.b_from_a.translation;
+  // The pillar was knocked after the check: everything that follows is 30 mm to the east.
+  auto knocked = Later(Without<SetUpKnown>(round_), seconds(40));
+  for (GuidanceInput& input : knocked) {
+    if (auto* prism = std::get_if<PrismSeen>(&input)) prism->p_in_site.x() += 0.03;
+  }
+  core_.Advance(knocked, at_ + seconds(40));
+  EXPECT_NEAR(
+      core_.snapshot().rear.site_from_shield.b_from_a.translation.x() - before.x(), 0.03, 0.003);
+  auto set_up = std::get<SetUpKnown>(Only<SetUpKnown>(round_).front());
+  set_up.trusted_until = at_ + seconds(5);
+  const auto live = Later(Without<SetUpKnown>(Without<PrismSeen>(round_)), seconds(41));
+  auto with_check = live;
+  with_check.insert(with_check.begin(), set_up);
+  core_.Advance(with_check, at_ + seconds(41));
+  EXPECT_EQ(core_.snapshot().rear.worth, Worth::kDegraded);
+  EXPECT_EQ(core_.snapshot().rear.reason, GuidanceReason::kSetUpSuspect);
+  EXPECT_LT((core_.snapshot().rear.site_from_shield.b_from_a.translation - before).norm(), 0.01);
+  EXPECT_NEAR(core_.snapshot().rear.age_s, 45.0, 12.0);
+  CameraGoesOn(seconds(43));
+  EXPECT_EQ(StateOf(GuidanceAlarm::kSetUpNotGood), AlarmState::kUnacknowledged);
+  // The check was repeated and is good: the readings count again.
+  set_up.trusted_until.reset();
+  core_.Advance(std::vector<GuidanceInput>{set_up}, at_ + seconds(44));
+  EXPECT_NEAR(
+      core_.snapshot().rear.site_from_shield.b_from_a.translation.x() - before.x(), 0.03, 0.003);
+  EXPECT_EQ(core_.snapshot().fix_trouble, GuidanceReason::kNone);
+}
+
+TEST_F(Core, WithNothingTrustedThereIsNoPosition) {
+  auto never = round_;
+  for (GuidanceInput& input : never) {
+    if (auto* set_up = std::get_if<SetUpKnown>(&input)) set_up->trusted_until = Timestamp{-1};
+  }
+  core_.Advance(never, at_);
+  EXPECT_EQ(core_.snapshot().rear.worth, Worth::kInvalid);
+  EXPECT_EQ(core_.snapshot().rear.reason, GuidanceReason::kSetUpSuspect);
+}
+
+TEST_F(Core, ReadingsOfAnotherSetUpAreNotMixedWithThoseOfThisOne) {
+  Begin();
+  // A second set-up, 20 mm off, of which three prisms were read and one not yet.
+  auto set_up = std::get<SetUpKnown>(Only<SetUpKnown>(round_).front());
+  set_up.number += 1;
+  std::vector<GuidanceInput> inputs{set_up};
+  for (GuidanceInput input : Later(Only<PrismSeen>(round_), seconds(20))) {
+    auto& prism = std::get<PrismSeen>(input);
+    if (prism.prism == 3) continue;
+    prism.set_up_number = set_up.number;
+    prism.p_in_site.x() += 0.02;
+    inputs.push_back(input);
+  }
+  const auto tilts = Later(Only<TiltSeen>(round_), seconds(20));
+  inputs.insert(inputs.begin(), tilts.begin(), tilts.end());
+  core_.Advance(inputs, at_ + seconds(20));
+  ASSERT_TRUE(core_.snapshot().fix);
+  EXPECT_EQ(core_.snapshot().fix->prisms_used, 3);
+  EXPECT_FALSE(core_.snapshot().fix->left_out);
+}
+
+TEST_F(Core, APrismThatWasKnockedIsLeftOutAndNamed) {
+  for (GuidanceInput& input : round_) {
+    auto* prism = std::get_if<PrismSeen>(&input);
+    if (prism != nullptr && prism->prism == 2) prism->p_in_site += Eigen::Vector3d(0.04, 0.03, 0.0);
+  }
+  Begin();
+  ASSERT_TRUE(core_.snapshot().fix && core_.snapshot().fix->left_out);
+  EXPECT_EQ(*core_.snapshot().fix->left_out, 2);
+  EXPECT_EQ(core_.snapshot().rear.worth, Worth::kDegraded);
+  EXPECT_EQ(core_.snapshot().rear.reason, GuidanceReason::kPrismLeftOut);
+  CameraGoesOn(seconds(2));
+  EXPECT_EQ(StateOf(GuidanceAlarm::kPrismsDisagree), AlarmState::kUnacknowledged);
+}
+
+TEST_F(Core, TwoPrismsTakenForEachOtherArePutRight) {
+  Begin();
+  const Eigen::Vector3d truth = core_.snapshot().rear.site_from_shield.b_from_a.translation;
+  GuidanceCore other(TheMachine().machine, TheMachine().rig, TheMachine().axis);
+  for (GuidanceInput& input : round_) {
+    auto* prism = std::get_if<PrismSeen>(&input);
+    if (prism != nullptr && prism->prism < 2) prism->prism = 1 - prism->prism;
+  }
+  const Snapshot& snapshot = other.Advance(round_, at_);
+  ASSERT_TRUE(snapshot.fix && snapshot.fix->exchanged);
+  EXPECT_EQ(snapshot.rear.reason, GuidanceReason::kPrismsExchanged);
+  EXPECT_LT((snapshot.rear.site_from_shield.b_from_a.translation - truth).norm(), 0.002);
+}
+
+TEST_F(Core, LateAndDoubledInputsChangeNothing) {
+  Begin();
+  const Eigen::Vector3d said = Cutter().p_in_site.p;
+  auto late = Later(round_, -seconds(5));
+  for (GuidanceInput& input : late) {
+    if (auto* prism = std::get_if<PrismSeen>(&input)) prism->p_in_site.y() += 1.0;
+    if (auto* pose = std::get_if<RelativeSeen>(&input)) {
+      pose->camera_from_target.b_from_a.translation.x() += 1.0;
+    }
+  }
+  core_.Advance(Without<TiltSeen>(late), at_);
+  core_.Advance(Without<TiltSeen>(round_), at_);
+  EXPECT_EQ(Cutter().p_in_site.p, said);
+}
+
+TEST_F(Core, AClockThatIsSetBackMakesEverythingMeasuredUnknown) {
+  Begin();
+  core_.Advance({}, at_ - seconds(3600));
+  EXPECT_EQ(core_.snapshot().rear.worth, Worth::kInvalid);
+  EXPECT_EQ(core_.snapshot().station.freshness, Freshness::kMissing);
+  // The next round counts under the new clock, with the set-up that is still the same.
+  core_.Advance(Later(Without<SetUpKnown>(round_), -seconds(3600)), at_ - seconds(3600));
+  EXPECT_EQ(Cutter().worth, Worth::kValid);
+}
+
+TEST_F(Core, BeyondTheEndOfTheDesignThereIsNoDeviation) {
+  auto far_off = round_;
+  const AxisPoint end = *TheMachine().axis.At(TheMachine().axis.end());
+  const Eigen::Vector3d move = *end.p_in_site() + 10.0 * *end.direction_in_site() - [&] {
+    Begin();
+    return Cutter().p_in_site.p;
+  }();
+  GuidanceCore other(TheMachine().machine, TheMachine().rig, TheMachine().axis);
+  for (GuidanceInput& input : far_off) {
+    if (auto* prism = std::get_if<PrismSeen>(&input)) prism->p_in_site += move;
+  }
+  const Snapshot& snapshot = other.Advance(far_off, at_);
+  EXPECT_EQ(snapshot.front.worth, Worth::kValid);  // it is known where it is
+  const PointState& cutter = snapshot.points[TheMachine().machine.steer_by];
+  EXPECT_EQ(cutter.worth, Worth::kInvalid);
+  EXPECT_EQ(cutter.reason, GuidanceReason::kBeyondEnd);
+}
+
+TEST_F(Core, AnAlarmIsRaisedAnsweredAndClearedWithHysteresis) {
+  Machine strict = TheMachine().machine;
+  Begin();
+  const Deviation said = Cutter().deviation;
+  const double off_m = std::hypot(said.right_m, *said.up_m);
+  strict.deviation_m = {0.9 * off_m, 0.8 * off_m};
+  GuidanceCore core(strict, TheMachine().rig, TheMachine().axis);
+  const auto state = [&] { return core.alarms().alarm(0).state; };
+  const auto live = Without<SetUpKnown>(Without<PrismSeen>(round_));
+  core.Advance(round_, at_);
+  EXPECT_EQ(state(), AlarmState::kNormal);  // not yet for long enough
+  core.Advance(Later(live, seconds(3)), at_ + seconds(3));
+  EXPECT_EQ(state(), AlarmState::kUnacknowledged);
+  core.Advance(std::vector<GuidanceInput>{AlarmAnswered{0}}, at_ + seconds(3));
+  EXPECT_EQ(state(), AlarmState::kAcknowledged);
+  // The camera fails for good: nothing is known, so nothing is cleared.
+  for (int s = 4; s < 400; ++s) core.Advance({}, at_ + seconds(s));
+  EXPECT_EQ(core.snapshot().points[strict.steer_by].worth, Worth::kInvalid);
+  EXPECT_EQ(state(), AlarmState::kAcknowledged);
+}
+
+TEST_F(Core, TheSameInputsGiveTheSameBits) {
+  GuidanceCore again(TheMachine().machine, TheMachine().rig, TheMachine().axis);
+  Drive drive(TheMachine(), {}, "same bits");
+  for (int i = 0; i < 60; ++i) {
+    drive.Measure(2060.0 + 5.0 * i);
+    const Snapshot& a = core_.Advance(drive.inputs(), drive.now());
+    const Snapshot& b = again.Advance(drive.inputs(), drive.now());
+    ASSERT_EQ(a.front.worth, b.front.worth);
+    ASSERT_EQ(a.front.site_from_shield.b_from_a, b.front.site_from_shield.b_from_a);
+    ASSERT_EQ(a.front.site_from_shield.covariance, b.front.site_from_shield.covariance);
+    ASSERT_EQ(a.ahead.size(), b.ahead.size());
+    if (!a.ahead.empty()) {
+      ASSERT_EQ(a.ahead.back().right.off_m, b.ahead.back().right.off_m);
+    }
+  }
+}
+
+TEST_F(Core, AStepTakesNoHeap) {
+  Begin();
+  Drive drive(TheMachine(), {}, "no heap");
+  for (int i = 0; i < 20; ++i) {
+    drive.Measure(2060.0 + 5.0 * i);
+    const HeapCounter heap;
+    core_.Advance(drive.inputs(), drive.now());
+    EXPECT_EQ(heap.Count(), 0);
+  }
+}
+
+TEST(GuidanceReasons, EachHasAWordOfItsOwn) {
+  std::vector<std::string> words;
+  for (int i = 0; i < kGuidanceReasonCount; ++i) {
+    words.emplace_back(ReasonCode(static_cast<GuidanceReason>(i)));
+    EXPECT_LE(words.back().size(), 48u);
+  }
+  EXPECT_EQ(words.front(), "");
+  std::sort(words.begin(), words.end());
+  EXPECT_EQ(std::adjacent_find(words.begin(), words.end()), words.end());
+}
+
+}  // namespace
+}  // namespace tbm::test
