@@ -16,39 +16,6 @@ namespace {
 using watch::AgeText;
 using watch::Mm;
 
-constexpr double kClockTrustS = 0.5;  // how far ahead of us a stamp may be before it is mentioned
-
-// Age, staleness and dress of one row.
-struct Freshness {
-  double age_s = 0.0;
-  bool is_stale = false;
-  std::string clock;  // ", clock 3.1 s ahead" when the sender's clock is doubtful
-
-  WatchRow Dress(WatchRow row) const {
-    row.age = AgeText(age_s);
-    if (is_stale) {
-      row.status = row.status.empty() ? "STALE" : "STALE, was " + row.status;
-      row.style = WatchStyle::kStale;
-      if (!row.value.empty()) row.value = "(" + row.value + ")";
-      row.sigma.clear();
-    }
-    row.status += clock;
-    return row;
-  }
-};
-
-Freshness FreshnessOf(WatchBoard::Instant received_at,
-                      Timestamp sensed_at,
-                      const WatchNow& now,
-                      double stale_after_s) {
-  Freshness freshness;
-  freshness.age_s = WatchAgeS(received_at, sensed_at, now);
-  freshness.is_stale = freshness.age_s > stale_after_s;
-  const double ahead_s = SecondsBetween(now.utc, sensed_at);
-  if (ahead_s > kClockTrustS) freshness.clock = fmt::format(", clock {:.1f} s ahead", ahead_s);
-  return freshness;
-}
-
 WatchStyle StyleOf(PoseStatus status) {
   switch (status) {
     case PoseStatus::kOk:
@@ -73,13 +40,6 @@ WatchStyle StyleOf(dds::DeviceState state) {
 }
 
 }  // namespace
-
-double WatchAgeS(std::chrono::steady_clock::time_point received_at,
-                 Timestamp sensed_at,
-                 const WatchNow& now) {
-  const double since_received_s = std::chrono::duration<double>(now.steady - received_at).count();
-  return std::max({0.0, since_received_s, SecondsBetween(sensed_at, now.utc)});
-}
 
 void WatchBoard::Add(const dds::RelativePose& pose, Instant received_at) {
   poses_[std::string(pose.machine_id)] = {pose, received_at};
@@ -121,15 +81,29 @@ void WatchBoard::Add(const dds::Alarm& alarm) {
   }
 }
 
+void WatchBoard::Add(const dds::Guidance& guidance, Instant received_at) {
+  guidance_.Add(guidance, received_at);
+}
+void WatchBoard::Add(const dds::ShieldPose& pose, Instant received_at) {
+  guidance_.Add(pose, received_at);
+}
+void WatchBoard::Add(const dds::StationSetUp& set_up, Instant received_at) {
+  guidance_.Add(set_up, received_at);
+}
+void WatchBoard::Add(const dds::AlarmStatus& alarm, Instant received_at) {
+  guidance_.Add(alarm, received_at);
+}
+
 bool WatchBoard::is_empty() const {
-  return poses_.empty() && tilts_.empty() && features_.empty() && health_.empty() &&
-         events_.empty();
+  return guidance_.is_empty() && poses_.empty() && tilts_.empty() && features_.empty() &&
+         health_.empty() && events_.empty();
 }
 
 void WatchBoard::AppendPoses(const WatchNow& now, std::vector<WatchRow>& rows) const {
   for (const auto& [key, heard] : poses_) {
     const dds::RelativePose& pose = heard.message;
-    const Freshness fresh = FreshnessOf(heard.received_at, pose.sensed_at, now, watch::kStalePoseS);
+    const watch::RowAge fresh =
+        watch::AgeOf(heard.received_at, pose.sensed_at, now, watch::kStalePoseS);
     const std::string status = watch::StatusText(pose.status, pose.reason);
     const bool has_pose = pose.status != PoseStatus::kNone;
     WatchRow row{"pose " + key, "", "", "", status, StyleOf(pose.status)};
@@ -180,7 +154,7 @@ void WatchBoard::AppendTilts(const WatchNow& now, std::vector<WatchRow>& rows) c
       row.sigma = fmt::format("{:.4f}", RadToDeg(tilt.sigma_rad));
     }
     rows.push_back(
-        FreshnessOf(heard.received_at, tilt.sensed_at, now, watch::kStalePoseS).Dress(row));
+        watch::AgeOf(heard.received_at, tilt.sensed_at, now, watch::kStalePoseS).Dress(row));
   }
 }
 
@@ -198,7 +172,8 @@ void WatchBoard::AppendFeatures(const WatchNow& now, std::vector<WatchRow>& rows
                  "",
                  is_good ? "ok" : std::string(ReasonCode(f.reason)),
                  is_good ? WatchStyle::kGood : WatchStyle::kBad};
-    rows.push_back(FreshnessOf(heard.received_at, f.sensed_at, now, watch::kStalePoseS).Dress(row));
+    rows.push_back(
+        watch::AgeOf(heard.received_at, f.sensed_at, now, watch::kStalePoseS).Dress(row));
   }
 }
 
@@ -217,7 +192,7 @@ void WatchBoard::AppendHealth(const WatchNow& now, std::vector<WatchRow>& rows) 
                  StyleOf(health.state)};
     if (!health.detail.empty()) row.status += ": " + std::string(health.detail);
     rows.push_back(
-        FreshnessOf(heard.received_at, health.published_at, now, watch::kStaleHealthS).Dress(row));
+        watch::AgeOf(heard.received_at, health.published_at, now, watch::kStaleHealthS).Dress(row));
   }
 }
 
@@ -257,6 +232,7 @@ void WatchBoard::AppendEvents(const WatchNow& now, std::vector<WatchRow>& rows) 
 
 std::vector<WatchRow> WatchBoard::Rows(const WatchNow& now) const {
   std::vector<WatchRow> rows = {{"what", "value", "sigma", "age", "status", WatchStyle::kHeading}};
+  guidance_.Append(now, rows);
   AppendPoses(now, rows);
   AppendTilts(now, rows);
   AppendFeatures(now, rows);

@@ -1,46 +1,22 @@
 #pragma once
 
-#include <chrono>
-#include <deque>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "guidance/app/watch_guidance.h"
+#include "guidance/app/watch_row.h"
 #include "idl/cpp/alarm.h"
+#include "idl/cpp/guidance_messages.h"
 #include "idl/cpp/messages.h"
 
 namespace tbm {
 
-// The two times that an age needs, taken together.
-struct WatchNow {
-  std::chrono::steady_clock::time_point steady;
-  Timestamp utc;
-};
-
-// How old a sample is: by this machine's steady clock since it came, or by its own stamp, whichever
-// is worse. A network that delivers late, a sender that repeats itself and a clock that was set
-// back each betray themselves in one of the two.
-double WatchAgeS(std::chrono::steady_clock::time_point received_at,
-                 Timestamp sensed_at,
-                 const WatchNow& now);
-
-enum class WatchStyle { kHeading, kGood, kDegraded, kBad, kStale, kPlain };
-
-// One line of the screen. A stale row carries its last value in brackets: never in normal dress.
-struct WatchRow {
-  std::string what;
-  std::string value;
-  std::string sigma;
-  std::string age;
-  std::string status;
-  WatchStyle style = WatchStyle::kPlain;
-};
-
-// What is known of all live topics, as rows for a screen. Knows neither DDS nor clocks nor
-// terminals. Not thread-safe.
+// What is known of all live topics, as rows for a screen: first what the operator steers by. Knows
+// neither DDS nor clocks nor terminals. Not thread-safe.
 class WatchBoard {
  public:
-  using Instant = std::chrono::steady_clock::time_point;
+  using Instant = WatchInstant;
 
   void Add(const dds::RelativePose& pose, Instant received_at);
   void Add(const dds::TiltReading& tilt, Instant received_at);
@@ -48,16 +24,17 @@ class WatchBoard {
   void Add(const dds::DeviceHealth& health, Instant received_at);
   void Add(const dds::Event& event, Instant received_at);
   void Add(const dds::Alarm& alarm);
+  void Add(const dds::Guidance& guidance, Instant received_at);
+  void Add(const dds::ShieldPose& pose, Instant received_at);
+  void Add(const dds::StationSetUp& set_up, Instant received_at);
+  void Add(const dds::AlarmStatus& alarm, Instant received_at);
 
   bool is_empty() const;
   std::vector<WatchRow> Rows(const WatchNow& now) const;
 
  private:
   template <class Message>
-  struct Heard {
-    Message message;
-    Instant received_at;
-  };
+  using Heard = WatchHeard<Message>;
 
   void AppendPoses(const WatchNow& now, std::vector<WatchRow>& rows) const;
   void AppendTilts(const WatchNow& now, std::vector<WatchRow>& rows) const;
@@ -72,6 +49,7 @@ class WatchBoard {
   std::map<std::string, Heard<dds::DeviceHealth>> health_;
   std::map<std::string, Heard<dds::Event>> events_;
   std::map<std::string, dds::Alarm> alarms_;
+  GuidanceBoard guidance_;
 };
 
 // The rows as text for a terminal of the given width, colours included when wanted.
@@ -85,5 +63,9 @@ std::string WatchLine(const dds::FrameFeatures& features, double age_s);
 std::string WatchLine(const dds::DeviceHealth& health, double age_s);
 std::string WatchLine(const dds::Event& event, double age_s);
 std::string WatchLine(const dds::Alarm& alarm);
+std::string WatchLine(const dds::Guidance& guidance, double age_s);
+std::string WatchLine(const dds::ShieldPose& pose, double age_s);
+std::string WatchLine(const dds::StationSetUp& set_up, double age_s);
+std::string WatchLine(const dds::AlarmStatus& alarm, double age_s);
 
 }  // namespace tbm

@@ -55,6 +55,10 @@ Timestamp TimeOf(const dds::TiltReading& message) { return message.sensed_at; }
 Timestamp TimeOf(const dds::FrameFeatures& message) { return message.sensed_at; }
 Timestamp TimeOf(const dds::DeviceHealth& message) { return message.published_at; }
 Timestamp TimeOf(const dds::Event& message) { return message.at; }
+Timestamp TimeOf(const dds::Guidance& message) { return message.valid_at; }
+Timestamp TimeOf(const dds::ShieldPose& message) { return message.valid_at; }
+Timestamp TimeOf(const dds::StationSetUp& message) { return message.published_at; }
+Timestamp TimeOf(const dds::AlarmStatus& message) { return message.published_at; }
 
 // Meeting point of the DDS threads, which bring samples, and the one that shows them.
 class Inbox {
@@ -116,7 +120,11 @@ class Subscriptions {
         tilts_(participant, Into<dds::TiltReading>(inbox)),
         features_(participant, Into<dds::FrameFeatures>(inbox)),
         health_(participant, Into<dds::DeviceHealth>(inbox)),
-        events_(participant, Into<dds::Event>(inbox)) {}
+        events_(participant, Into<dds::Event>(inbox)),
+        guidance_(participant, Into<dds::Guidance>(inbox)),
+        shields_(participant, Into<dds::ShieldPose>(inbox)),
+        set_ups_(participant, Into<dds::StationSetUp>(inbox)),
+        alarms_(participant, Into<dds::AlarmStatus>(inbox)) {}
 
  private:
   template <class Message>
@@ -131,6 +139,10 @@ class Subscriptions {
   dds::Subscriber<dds::FrameFeatures> features_;
   dds::Subscriber<dds::DeviceHealth> health_;
   dds::Subscriber<dds::Event> events_;
+  dds::Subscriber<dds::Guidance> guidance_;
+  dds::Subscriber<dds::ShieldPose> shields_;
+  dds::Subscriber<dds::StationSetUp> set_ups_;
+  dds::Subscriber<dds::AlarmStatus> alarms_;
 };
 
 int TerminalWidth() {
@@ -144,7 +156,8 @@ void ShowScreen(const Inbox& inbox, const WatchRequest& request, const Console& 
       fmt::format("tbm watch, domain {}; lengths in mm; Ctrl-C ends\n\n", request.domain_id);
   text += WatchScreen(inbox.Rows(), TerminalWidth(), with_colours);
   if (!inbox.has_heard())
-    text += "\nnothing heard yet: does a camera box run on this domain and interface?\n";
+    text +=
+        "\nnothing heard yet: does a camera box or guidance run on this domain and interface?\n";
   std::string screen = "\x1b[H";
   for (const char c : text) screen += c == '\n' ? std::string("\x1b[K\n") : std::string(1, c);
   console.out << screen << "\x1b[J" << std::flush;

@@ -49,9 +49,37 @@ std::string Harmless(std::string_view text) {
   return harmless;
 }
 
+std::string Number(std::string_view name, double value, int decimals) {
+  return std::isfinite(value) ? fmt::format(" {}={:.{}f}", name, value, decimals) : "";
+}
+
+std::string LineHead(std::string_view topic,
+                     std::string_view machine,
+                     Timestamp at,
+                     double age_s,
+                     bool is_stale,
+                     const std::string& status) {
+  return fmt::format("{} machine={} stamp_ns={} age_s={:.3f} status={}",
+                     topic,
+                     Harmless(machine),
+                     at.ns,
+                     age_s,
+                     is_stale ? "stale was=" + status : status);
+}
+
+std::string QuotedText(std::string_view text) {
+  std::string quoted = "\"";
+  for (const char c : Harmless(text)) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
 }  // namespace watch
 
 namespace {
+
+using watch::LineHead;
+using watch::Number;
+using watch::QuotedText;
 
 std::string_view ColourOf(WatchStyle style) {
   switch (style) {
@@ -73,33 +101,6 @@ std::string_view ColourOf(WatchStyle style) {
 
 std::string Cut(const std::string& text, std::size_t width) {
   return text.size() > width ? text.substr(0, width) : text + std::string(width - text.size(), ' ');
-}
-
-std::string Number(std::string_view name, double value, int decimals) {
-  return std::isfinite(value) ? fmt::format(" {}={:.{}f}", name, value, decimals) : "";
-}
-
-// Machine, stamp and age, then the status: stale when it is, whatever the sender said.
-std::string LineHead(std::string_view topic,
-                     std::string_view machine,
-                     Timestamp at,
-                     double age_s,
-                     bool is_stale,
-                     const std::string& status) {
-  return fmt::format("{} machine={} stamp_ns={} age_s={:.3f} status={}",
-                     topic,
-                     watch::Harmless(machine),
-                     at.ns,
-                     age_s,
-                     is_stale ? "stale was=" + status : status);
-}
-
-// Quoted, with quotes inside doubled, so that a line splits at blanks outside quotes.
-std::string QuotedText(std::string_view text) {
-  std::string quoted = "\"";
-  for (const char c : watch::Harmless(text))
-    quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
 }
 
 }  // namespace

@@ -19,4 +19,17 @@ std::string StatusText(PoseStatus status, PoseReason reason);  // "degraded few_
 // Text from the wire for a terminal: control characters, which could redraw the screen, become '?'.
 std::string Harmless(std::string_view text);
 
+// Of a line for a pipe: machine, stamp and age, then the status: stale when it is, whatever the
+// sender said.
+std::string LineHead(std::string_view topic,
+                     std::string_view machine,
+                     Timestamp at,
+                     double age_s,
+                     bool is_stale,
+                     const std::string& status);
+// " name=1.25"; empty for what is no number.
+std::string Number(std::string_view name, double value, int decimals);
+// Quoted, with quotes inside doubled, so that a line splits at blanks outside quotes.
+std::string QuotedText(std::string_view text);
+
 }  // namespace tbm::watch

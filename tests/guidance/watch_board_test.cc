@@ -189,5 +189,234 @@ TEST(WatchBoard, LinesFitTheTerminal) {
   EXPECT_THAT(WatchScreen(board.Rows(NowAfter({})), 132, true), HasSubstr("\x1b[32mpose tbm7"));
 }
 
+dds::Guidance Steering() {
+  dds::Guidance guidance;
+  guidance.machine_id = "tbm7";
+  guidance.valid_at = kUtc;
+  guidance.validity = dds::Validity::kValid;
+  guidance.steer_by = "cutter_face";
+  guidance.set_up_number = 3;
+  guidance.lead_right_per_m = 0.0012;
+  guidance.lead_up_per_m = -0.0003;
+  guidance.lead_right_sigma_per_m = 0.0001;
+  guidance.lead_up_sigma_per_m = 0.0002;
+  guidance.articulation_right_rad = 0.004;
+  guidance.articulation_up_rad = -0.001;
+  guidance.articulation_roll_rad = 0.0005;
+  guidance.stroke_m = 0.5123;
+  guidance.ring_number = 45;
+  guidance.prisms_used = 4;
+  guidance.prisms_dof = 5;
+  guidance.prisms_rms_m = 0.0008;
+  dds::GuidedPoint point;
+  point.name = "cutter_face";
+  point.shield = "front";
+  point.validity = dds::Validity::kValid;
+  point.chainage_m = 2266.7234;
+  point.official_chainage_m = 2291.7234;
+  point.official_section = 1;
+  point.deviation_right_m = 0.0123;
+  point.deviation_up_m = -0.0045;
+  point.deviation_right_sigma_m = 0.0021;
+  point.deviation_up_sigma_m = 0.0089;
+  point.trend_right_per_m = 0.0004;
+  point.trend_up_per_m = 0.0001;
+  point.trend_length_m = 5.0;
+  guidance.points.push_back(point);
+  guidance.sources.push_back({"station", dds::SourceFreshness::kFresh, 12.0, ""});
+  guidance.sources.push_back({"camera", dds::SourceFreshness::kFresh, 0.2, ""});
+  guidance.ahead.push_back({1.0, 0.013, -0.005, 0.002, 0.003});
+  guidance.ahead.push_back({5.0, 0.0143, -0.0055, 0.004, 0.0045});
+  return guidance;
+}
+
+TEST(WatchBoard, ShowsWhatTheOperatorSteersBy) {
+  WatchBoard board;
+  board.Add(Steering(), kSteady);
+  const WatchNow now = NowAfter(std::chrono::milliseconds(150));
+  const WatchRow head = RowOf(board, now, "guidance tbm7");
+  EXPECT_EQ(head.value, "chainage 2266.723, on the wall 2291.723/1, ring 45, stroke 512.3 mm");
+  EXPECT_EQ(head.status, "valid");
+  EXPECT_EQ(head.style, WatchStyle::kGood);
+  const WatchRow face = RowOf(board, now, " > cutter_face");
+  EXPECT_EQ(face.value, "right    +12.3  up     -4.5 mm  at 2266.723");
+  EXPECT_EQ(face.sigma, "2.1 8.9");
+  EXPECT_EQ(RowOf(board, now, "   lead, look-up").value, "right     +1.2  up     -0.3 mm/m");
+  EXPECT_EQ(RowOf(board, now, "   lead, look-up").sigma, "0.1 0.2");
+  EXPECT_EQ(RowOf(board, now, "   articulation").value,
+            "right     +4.0  up     -1.0 mm/m  roll     +0.5 mm/m");
+  EXPECT_THAT(RowOf(board, now, "   trend").value, HasSubstr("+0.4  up     +0.1 mm/m  over 5.0 m"));
+  EXPECT_EQ(RowOf(board, now, "   5 m ahead").value, "right    +14.3  up     -5.5 mm");
+  EXPECT_EQ(RowOf(board, now, "   5 m ahead").sigma, "4.0 4.5");
+  EXPECT_EQ(RowOf(board, now, "   source station").value, "set-up 3, prisms 4, rms 0.8 mm");
+  EXPECT_EQ(RowOf(board, now, "   source station").status, "fresh 12 s");
+}
+
+TEST(WatchBoard, ACoastingSourceSaysForHowLongAndHowWell) {
+  WatchBoard board;
+  dds::Guidance guidance = Steering();
+  guidance.validity = dds::Validity::kDegraded;
+  guidance.reason = "station_coasting";
+  guidance.sources[0] = {"station", dds::SourceFreshness::kCoasting, 250.0, "prism_not_found"};
+  board.Add(guidance, kSteady);
+  const WatchNow now = NowAfter(std::chrono::milliseconds(100));
+  const WatchRow source = RowOf(board, now, "   source station");
+  EXPECT_EQ(source.status, "coasting 4 min, +-9 mm");
+  EXPECT_EQ(source.style, WatchStyle::kDegraded);
+  EXPECT_THAT(source.value, HasSubstr("; prism_not_found"));
+  EXPECT_EQ(RowOf(board, now, "guidance tbm7").status, "degraded station_coasting");
+}
+
+TEST(WatchBoard, MissingIsDashesNeverZero) {
+  WatchBoard board;
+  dds::Guidance guidance;
+  guidance.machine_id = "tbm7";
+  guidance.valid_at = kUtc;
+  guidance.reason = "no_prisms";
+  guidance.steer_by = "cutter_face";
+  dds::GuidedPoint point;
+  point.name = "cutter_face";
+  guidance.points.push_back(point);
+  guidance.sources.push_back({"station", dds::SourceFreshness::kMissing, NAN, ""});
+  board.Add(guidance, kSteady);
+  dds::ShieldPose shield;
+  shield.machine_id = "tbm7";
+  shield.shield = "rear";
+  shield.valid_at = kUtc;
+  board.Add(shield, kSteady);
+  dds::StationSetUp set_up;
+  set_up.machine_id = "tbm7";
+  set_up.role = "in_use";
+  set_up.published_at = kUtc;
+  board.Add(set_up, kSteady);
+  for (const WatchRow& row : board.Rows(NowAfter(std::chrono::milliseconds(100)))) {
+    if (row.style == WatchStyle::kHeading) continue;
+    EXPECT_THAT(row.value + row.sigma, Not(HasSubstr("nan"))) << row.what;
+    EXPECT_THAT(row.value + row.sigma, Not(HasSubstr("0.0"))) << row.what;
+    EXPECT_EQ(row.style, WatchStyle::kBad) << row.what;
+  }
+  const WatchNow now = NowAfter(std::chrono::milliseconds(100));
+  EXPECT_EQ(RowOf(board, now, "guidance tbm7").value,
+            "chainage --, on the wall --, ring --, stroke -- mm");
+  EXPECT_EQ(RowOf(board, now, "guidance tbm7").status, "none no_prisms");
+  EXPECT_EQ(RowOf(board, now, " > cutter_face").value, "right       --  up       -- mm  at --");
+  EXPECT_EQ(RowOf(board, now, "   ahead").value, "right       --  up       -- mm");
+  EXPECT_EQ(RowOf(board, now, "   source station").status, "missing");
+  EXPECT_THAT(RowOf(board, now, "shield tbm7 rear").value, HasSubstr("rests on --"));
+  EXPECT_THAT(RowOf(board, now, "station tbm7 in_use").value, HasSubstr("checked --"));
+}
+
+TEST(WatchBoard, OldGuidanceIsStaleInEveryRow) {
+  WatchBoard board;
+  board.Add(Steering(), kSteady);
+  for (const WatchRow& row : board.Rows(NowAfter(std::chrono::milliseconds(900)))) {
+    if (row.style == WatchStyle::kHeading) continue;
+    EXPECT_EQ(row.style, WatchStyle::kStale) << row.what;
+    EXPECT_EQ(row.sigma, "") << row.what;
+    EXPECT_TRUE(row.value.empty() || row.value.starts_with("(")) << row.what;
+  }
+}
+
+TEST(WatchBoard, AlarmsSayCauseAndWhatToDoAndOutliveTheirSender) {
+  WatchBoard board;
+  dds::AlarmStatus alarm;
+  alarm.machine_id = "tbm7";
+  alarm.source = "guidance";
+  alarm.code = "deviation_high";
+  alarm.published_at = kUtc;
+  alarm.raised_at = kUtc - std::chrono::seconds(90);
+  alarm.phase = dds::AlarmPhase::kUnacknowledged;
+  alarm.urgency = dds::AlarmUrgency::kHigh;
+  alarm.value = 52.34;
+  alarm.raise_above = 50.0;
+  alarm.unit = "mm";
+  alarm.cause = "cutter_face is off the design";
+  alarm.response = "steer back, no faster than 5 mm/m";
+  board.Add(alarm, kSteady);
+  dds::AlarmStatus other = alarm;
+  other.code = "roll_high";
+  other.phase = dds::AlarmPhase::kNormal;
+  board.Add(other, kSteady);
+  WatchRow row =
+      RowOf(board, NowAfter(std::chrono::milliseconds(100)), "ALARM guidance deviation_high");
+  EXPECT_EQ(row.value,
+            "cutter_face is off the design (52.3 mm, limit 50); steer back, no faster than 5 mm/m");
+  EXPECT_EQ(row.status, "high unacknowledged");
+  EXPECT_EQ(row.age, "90 s");
+  EXPECT_EQ(row.style, WatchStyle::kBad);
+  EXPECT_EQ(board.Rows(NowAfter({})).size(), 2u) << "a normal alarm is no row";
+
+  row = RowOf(board, NowAfter(std::chrono::seconds(60)), "ALARM guidance deviation_high");
+  EXPECT_EQ(row.status, "high unacknowledged, source silent");
+  EXPECT_EQ(row.style, WatchStyle::kBad);
+
+  alarm.phase = dds::AlarmPhase::kAcknowledged;
+  alarm.acknowledged_by = "m.weber";
+  board.Add(alarm, kSteady);
+  EXPECT_EQ(RowOf(board, NowAfter({}), "ALARM guidance deviation_high").status,
+            "high acknowledged by m.weber");
+}
+
+TEST(WatchBoard, AShieldAndASetUpShowTheirNumbers) {
+  WatchBoard board;
+  dds::ShieldPose shield;
+  shield.machine_id = "tbm7";
+  shield.shield = "front";
+  shield.valid_at = kUtc;
+  shield.validity = dds::Validity::kValid;
+  shield.age_s = 31.0;
+  shield.site_from_shield.translation = {1038.5672, 5045.9627, 99.1};
+  shield.heading_rad = DegToRad(40.0);
+  shield.pitch_rad = -0.015;
+  shield.roll_rad = 0.0021;
+  shield.roll_sigma_rad = 0.00011;
+  shield.pitch_sigma_rad = 0.00022;
+  board.Add(shield, kSteady);
+  dds::StationSetUp set_up;
+  set_up.machine_id = "tbm7";
+  set_up.role = "proposed";
+  set_up.published_at = kUtc;
+  set_up.set_up_number = 4;
+  set_up.state = dds::SetUpState::kGood;
+  set_up.last_good_check_at = kUtc - std::chrono::seconds(300);
+  set_up.position_in_site_m = {1017.8, 5017.7, 101.6};
+  set_up.covariance = 1e-6 * Eigen::Matrix4d::Identity();
+  set_up.closure_worst_m = 0.0021;
+  set_up.closure_tolerance_m = 0.005;
+  set_up.closure_points = 3;
+  board.Add(set_up, kSteady);
+  const WatchNow now = NowAfter(std::chrono::milliseconds(100));
+  EXPECT_EQ(RowOf(board, now, "shield tbm7 front").value,
+            "roll     +2.1  pitch    -15.0 mm/m, heading 40.0000 deg, at 1038.5672 5045.9627 "
+            "99.1000 m, rests on 31 s ago");
+  EXPECT_EQ(RowOf(board, now, "shield tbm7 front").sigma, "0.11 0.22");
+  EXPECT_EQ(RowOf(board, now, "station tbm7 proposed").value,
+            "set-up 4 at 1017.8000 5017.7000 101.6000 m, 0 of 0 references, checked 5 min ago, "
+            "closure 2.1 of 5.0 mm at 3 points");
+  EXPECT_EQ(RowOf(board, now, "station tbm7 proposed").sigma, "1.0 1.0 1.0");
+}
+
+TEST(WatchLine, GuidanceGivesItsNumbersAndLeavesOutWhatIsMissing) {
+  const std::string line = WatchLine(Steering(), 0.1);
+  EXPECT_THAT(line,
+              StartsWith("guidance machine=tbm7 stamp_ns=1790000000000000000 age_s=0.100 "
+                         "status=valid steer_by=cutter_face ring=45 stroke_mm=512.30"));
+  EXPECT_THAT(line, HasSubstr(" cutter_face_right_mm=12.30 cutter_face_up_mm=-4.50"));
+  EXPECT_THAT(line, HasSubstr(" station=fresh station_age_s=12.0"));
+  const std::string stale = WatchLine(Steering(), 2.0);
+  EXPECT_THAT(stale, HasSubstr("status=stale was=valid"));
+  EXPECT_THAT(stale, Not(HasSubstr("_mm=")));
+  dds::Guidance nothing = Steering();
+  nothing.points[0].deviation_up_m = NAN;
+  nothing.ring_number = -1;
+  EXPECT_THAT(WatchLine(nothing, 0.1), Not(HasSubstr("cutter_face_up_mm")));
+  EXPECT_THAT(WatchLine(nothing, 0.1), Not(HasSubstr("ring=")));
+  dds::ShieldPose shield;
+  shield.shield = "rear";
+  shield.reason = "no_prisms";
+  EXPECT_THAT(WatchLine(shield, 0.1), HasSubstr("status=none shield=rear reason=no_prisms"));
+  EXPECT_THAT(WatchLine(shield, 0.1), Not(HasSubstr("east_m")));
+}
+
 }  // namespace
 }  // namespace tbm
