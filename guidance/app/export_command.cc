@@ -251,11 +251,10 @@ class Exporting {
       return nullptr;
     const std::string foreignness = Foreignness(channel, topic);
     if (foreignness.empty()) return topic;
-    if (!is_writing_) {
-      Complain(console_,
-               fmt::format(
-                   "{}: topic {} is not exported: {}", path, Quoted(channel.topic), foreignness));
-    }
+    const std::string note =
+        fmt::format("topic {} is not exported: {}", Quoted(channel.topic), foreignness);
+    // Once, however many files say the same.
+    if (!is_writing_ && told_.insert(note).second) Complain(console_, path + ": " + note);
     return nullptr;
   }
 
@@ -307,6 +306,7 @@ class Exporting {
   Timestamp from_{std::numeric_limits<std::int64_t>::min()};
   Timestamp to_{std::numeric_limits<std::int64_t>::max()};
   std::set<std::string_view> wanted_;
+  std::set<std::string> told_;
   std::vector<Source> sources_;
   std::map<std::uint16_t, const Topic*> channels_;  // of the file being read
   std::map<std::string_view, Table> tables_;

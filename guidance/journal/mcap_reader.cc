@@ -69,6 +69,11 @@ std::optional<Record> RecordAt(BytesView bytes) {
   return Record{static_cast<Op>(op), content};
 }
 
+std::uint32_t CrcOf(BytesView bytes) {
+  return static_cast<std::uint32_t>(
+      ::crc32_z(0, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
+}
+
 Timestamp TimeOf(std::uint64_t ns) { return {static_cast<std::int64_t>(ns)}; }
 
 class Reading {
@@ -78,6 +83,7 @@ class Reading {
       : file_(file), on_message_(on_message) {}
 
   McapContent Run() {
+    LearnFromSummary();
     std::size_t at = mcap::kMagic.size();
     while (at < file_.size() && !content_.has_footer) {
       const std::optional<Record> record = RecordAt(file_.subspan(at));
@@ -98,7 +104,9 @@ class Reading {
   std::optional<McapDamageKind> Take(const Record& record, std::size_t at) {
     switch (record.op) {
       case Op::kHeader:
-        return at == mcap::kMagic.size() ? std::nullopt : std::optional(McapDamageKind::kMalformed);
+        return at == mcap::kMagic.size() && IsHeader(record.content)
+                   ? std::nullopt
+                   : std::optional(McapDamageKind::kMalformed);
       case Op::kSchema:
         return TakeSchema(record.content);
       case Op::kChannel:
@@ -116,6 +124,37 @@ class Reading {
       default:
         // The summary says nothing that the data does not.
         return is_behind_data_ ? std::nullopt : std::optional(McapDamageKind::kForeign);
+    }
+  }
+
+  static bool IsHeader(BytesView content) {
+    Cursor cursor(content);
+    (void)cursor.TakeText();  // profile
+    (void)cursor.TakeText();  // library
+    return cursor.is_sound() && cursor.rest().empty();
+  }
+
+  // Schemas and channels stand once among the data, where no CRC covers them. A whole summary tells
+  // them again under a CRC of its own: with it, a damaged one costs nothing.
+  void LearnFromSummary() {
+    constexpr std::size_t kFooterContent = 20;
+    constexpr std::size_t kFooter = mcap::kRecordHead + kFooterContent;
+    if (file_.size() < 2 * mcap::kMagic.size() + kFooter || !EndsAsItShould()) return;
+    const std::size_t footer_at = file_.size() - mcap::kMagic.size() - kFooter;
+    const std::optional<Record> footer = RecordAt(file_.subspan(footer_at));
+    if (!footer || footer->op != Op::kFooter || footer->content.size() != kFooterContent) return;
+    Cursor cursor(footer->content);
+    const auto start = cursor.Take<std::uint64_t>();
+    (void)cursor.Take<std::uint64_t>();  // where the offsets of the groups begin
+    if (start < mcap::kMagic.size() || start > footer_at) return;
+    BytesView rest = file_.subspan(start, footer_at - start);
+    const BytesView covered =
+        file_.subspan(start, footer_at + kFooter - sizeof(std::uint32_t) - start);
+    if (CrcOf(covered) != cursor.Take<std::uint32_t>()) return;
+    while (const std::optional<Record> record = RecordAt(rest)) {
+      if (record->op == Op::kSchema) (void)TakeSchema(record->content);
+      if (record->op == Op::kChannel) (void)TakeChannel(record->content);
+      rest = rest.subspan(mcap::kRecordHead + record->content.size());
     }
   }
 
@@ -193,10 +232,7 @@ class Reading {
 
   // Without a CRC (zero, as the specification allows) nothing is known against the bytes.
   static bool HasRightCrc(const Chunk& chunk) {
-    return chunk.crc == 0 ||
-           chunk.crc == ::crc32_z(0,
-                                  reinterpret_cast<const unsigned char*>(chunk.records.data()),
-                                  chunk.records.size());
+    return chunk.crc == 0 || chunk.crc == CrcOf(chunk.records);
   }
 
   std::optional<McapDamageKind> TakeChunk(BytesView content, std::size_t at) {

@@ -57,7 +57,8 @@ struct McapContent {
 // Messages are believed inside chunks only, where a CRC covers them.
 //
 // Reads a file from its first byte to its last without needing its summary or footer, message by
-// message in the order of the file; `on_message` may be empty. What is damaged is told and left
+// message in the order of the file; `on_message` may be empty. Where there is a whole summary,
+// schemas and channels are taken from it. What is damaged is told and left
 // out: behind it, reading goes on at the next chunk whose CRC is right.
 Result<McapContent, McapFailure> ReadMcap(
     BytesView file, const std::function<void(const McapChannel&, const McapMessage&)>& on_message);

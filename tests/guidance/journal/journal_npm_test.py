@@ -1,11 +1,13 @@
 """A journal says what it says to the library of its own format, without a line of ours: every field of
-every topic under its name, and after tbm repair at whichever byte the file was cut.
+every topic under its name, and after tbm repair at whichever byte the file was cut. The tables of
+tbm export say the same.
 
   journal_npm_test.py JOURNAL_SAMPLES TBM
 
 The expected values stand here a second time, under the names of the .idl files. A field of the IDL
 that is not among them is a failure.
 """
+import csv
 import json
 import math
 import pathlib
@@ -208,6 +210,77 @@ def cover(where, struct, expected, idl):
                 cover(f"{where}.{name}", inner[1], item, idl)
 
 
+ENU = ["east", "north", "up"]
+# Names of the numbers of an array, where it becomes several columns; None leaves a number out.
+ARRAYS = {
+    ("relative_pose", "camera_from_target_translation_m"): [f"camera_from_target_{a}_m" for a in "xyz"],
+    ("relative_pose", "in_camera_m"): [f"{a}_in_camera_m" for a in "xyz"],
+    ("station_set_up", "closure_m"): [f"closure_{a}_m" for a in ENU],
+    ("station_observation", "by_station"):
+        [f"by_station_{a}_per_{b}" for a in ENU for b in [*ENU, "circle_zero_m_per_rad"]],
+}
+
+
+def upper_triangle(name, axes, unit=""):
+    return [f"{name}_{a}_{b}{unit}" if i <= j else None for i, a in enumerate(axes) for j, b in enumerate(axes)]
+
+
+for t in ["station_observation", "station_set_up", "shield_pose", "guidance"]:
+    ARRAYS[t, "position_in_site_m"] = [f"position_in_site_{a}_m" for a in ENU]
+ARRAYS["station_observation", "covariance_of_reading_m2"] = upper_triangle("covariance_of_reading", ENU, "_m2")
+ARRAYS["station_set_up", "covariance"] = upper_triangle(
+    "covariance", [*(f"{a}_m" for a in ENU), "circle_zero_rad"])
+ARRAYS["shield_pose", "covariance"] = upper_triangle(
+    "covariance", [*(f"turn_{a}_rad" for a in ENU), *(f"{a}_m" for a in ENU)])
+ARRAYS["relative_pose", "covariance"] = upper_triangle(
+    "covariance", [*(f"turn_{a}_rad" for a in "xyz"), *(f"{a}_m" for a in "xyz")])
+# What stands before the names of the fields of an item: its own name, or its place.
+BEFORE = {"spots": "spot_{place}_", "points": "{name}_", "references": "reference_{name}_",
+          "sources": "source_{name}_", "ahead": "ahead_{place}_"}
+PREFIXES = re.compile("^(TILT|POSE_STATUS|DEVICE|EVENT|OBSERVED|OBSERVATION_FACE|OBSERVATION|SET_UP|GUIDANCE|"
+                      "SOURCE|ALARM|COMMAND)_")
+
+
+def cells(topic, message, idl):
+    """A message as tbm export is to write it: column -> text or number."""
+    row = {}
+    for name, value in message.items():
+        if (topic, name) == ("relative_pose", "reason"):
+            continue  # its word stands in reason_code
+        if name in BEFORE:
+            for place, item in enumerate(value, 1):
+                before = BEFORE[name].format(place=place, name=item.get("name"))
+                inner = {field: v for field, v in item.items() if field != "name"}
+                row.update({before + field: v for field, v in cells(topic, inner, idl).items()})
+        elif isinstance(value, list):
+            columns = ARRAYS[topic, name]
+            expect(len(columns) == len(value), f"{topic}.{name}: {len(columns)} columns")
+            row.update({column: v for column, v in zip(columns, value) if column})
+        elif isinstance(value, str) and value in idl.numbers:
+            row[name] = PREFIXES.sub("", value).lower()
+        elif value == -1 or isinstance(value, float) and math.isnan(value):
+            row[name] = ""
+        else:
+            row[name] = int(value) if isinstance(value, bool) else value
+    return row
+
+
+def test_every_column(folder, idl):
+    subprocess.run([samples, "full", folder / "journal"], check=True, capture_output=True)
+    subprocess.run([tbm, "export", folder / "journal", "--out", folder / "tables"], check=True, capture_output=True)
+    tables = {file.stem: list(csv.DictReader(file.open())) for file in (folder / "tables").iterdir()}
+    expect(set(tables) == set(EXPECTED), f"tables {sorted(tables)}")
+    for number, (topic, message) in enumerate(EXPECTED.items()):
+        (row,) = tables[topic]
+        wanted = {"log_time_utc_ns": 1_795_442_700_000_000_007 + number, "log_sequence": 1,
+                  **cells(topic, message, idl)}
+        expect(set(row) == set(wanted), f"{topic}.csv: columns {sorted(set(row) ^ set(wanted))}")
+        for column, value in wanted.items():
+            text = row.get(column, "")
+            same = text == value if isinstance(value, str) else text != "" and type(value)(text) == value
+            expect(same, f"{topic}.csv, {column}: {text} instead of {value}")
+
+
 def read_by_node(files):
     script = root / "tests/npm/read_journal.mjs"
     run = subprocess.run(["node", script, modules, *files], capture_output=True, text=True)
@@ -263,7 +336,7 @@ def test_repaired_at_every_cut(folder):
 
 if __name__ == "__main__":
     contract = Idl(root / "idl")
-    for test, arguments in [(test_every_field, [contract]), (test_repaired_at_every_cut, [])]:
+    for test, arguments in [(test_every_field, [contract]), (test_every_column, [contract]), (test_repaired_at_every_cut, [])]:
         with tempfile.TemporaryDirectory() as place:
             test(pathlib.Path(place), *arguments)
     print("\n".join(failures[:40]))

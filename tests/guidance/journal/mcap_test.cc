@@ -155,6 +155,36 @@ TEST(Mcap, AFlippedBitCostsOneChunkAtMost) {
   }
 }
 
+// Schemas and channels stand once, without a CRC. The summary of a closed file knows them as well.
+TEST(Mcap, ADamagedChannelCostsNothingInAClosedFile) {
+  const Journal journal = Write(2);
+  const std::size_t chunk_from =
+      Text(journal.bytes).find("pose 0.0") - 31 - (8 + 8 + 8 + 4 + 4 + 8) - mcap::kRecordHead;
+  ASSERT_EQ(journal.bytes[chunk_from], static_cast<std::byte>(mcap::Op::kChunk));
+  for (std::size_t at = mcap::kMagic.size(); at < chunk_from; ++at) {
+    for (int bit = 0; bit < 8; ++bit) {
+      Bytes bytes = journal.bytes;
+      bytes[at] ^= static_cast<std::byte>(1 << bit);
+      const Seen seen = Read(bytes);
+      EXPECT_EQ(seen.messages, Expected(2)) << at << " " << bit;
+      EXPECT_EQ(seen.content.channels.at(1).schema.text, "struct Pose {};") << at << " " << bit;
+    }
+  }
+}
+
+TEST(Mcap, AChannelNeedsNoSchema) {
+  McapWriter writer("x");
+  Bytes bytes = writer.Begin();
+  const auto channel = writer.AddChannel("local/note", "text", {});
+  writer.AddMessage(channel, 1, {5}, {4}, View("hello"));
+  const Bytes end = writer.End();
+  bytes.insert(bytes.end(), end.begin(), end.end());
+  const Seen seen = Read(bytes);
+  EXPECT_EQ(seen.messages, std::vector<std::string>{"local/note: hello"});
+  EXPECT_EQ(seen.content.channels.at(1).schema, McapSchema{});
+  EXPECT_TRUE(seen.content.damages.empty());
+}
+
 TEST(Mcap, TwoFilesGluedGiveTheFirst) {
   Bytes glued = Write(1).bytes;
   const Bytes second = Write(2).bytes;
