@@ -39,6 +39,17 @@ constexpr const char* kExportHelp =
     "  tbm export journal --out tables --topic guidance --from 2026-11-23T06:00:00Z --to "
     "2026-11-23T14:00:00Z";
 
+constexpr const char* kReplayHelp =
+    "Takes every step of the guidance again from its own journal, in the order of the files, and "
+    "compares\n"
+    "each message with what was published then, bit for bit. With --machine the same readings go "
+    "through\n"
+    "another machine file: what would the operator have seen?\n"
+    "\n"
+    "Examples\n"
+    "  tbm replay journal\n"
+    "  tbm replay journal --machine measured_again.yaml";
+
 }  // namespace
 
 CLI::App* AddRecord(CLI::App& app, JournalRequests& requests) {
@@ -88,6 +99,15 @@ CLI::App* AddExport(CLI::App& app, JournalRequests& requests) {
   exported->add_option("--to", request.to, "last log time");
   exported->add_flag("--force,-f", request.force, "replace existing files");
   return exported;
+}
+
+CLI::App* AddReplay(CLI::App& app, JournalRequests& requests) {
+  ReplayRequest& request = requests.replay;
+  CLI::App* replay = app.add_subcommand("replay", "The guidance's steps again, from its journal");
+  replay->footer(kReplayHelp);
+  replay->add_option("JOURNAL", request.journals, "files, or folders of them")->required();
+  replay->add_option("--machine", request.machine, "machine file instead of the journal's own");
+  return replay;
 }
 
 }  // namespace tbm

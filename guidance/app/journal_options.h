@@ -3,6 +3,7 @@
 #include "guidance/app/export_command.h"
 #include "guidance/app/record_command.h"
 #include "guidance/app/repair_command.h"
+#include "guidance/app/replay_command.h"
 
 namespace CLI {
 class App;
@@ -15,11 +16,13 @@ struct JournalRequests {
   RecordRequest record;
   RepairRequest repair;
   ExportRequest exported;
+  ReplayRequest replay;
 };
 
 // Each adds its command.
 CLI::App* AddRecord(CLI::App& app, JournalRequests& requests);
 CLI::App* AddRepair(CLI::App& app, JournalRequests& requests);
 CLI::App* AddExport(CLI::App& app, JournalRequests& requests);
+CLI::App* AddReplay(CLI::App& app, JournalRequests& requests);
 
 }  // namespace tbm

@@ -252,6 +252,7 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   const CLI::App* watch = AddWatch(app, requests);
   const CLI::App* record = AddRecord(app, requests.journal);
   const CLI::App* exported = AddExport(app, requests.journal);
+  const CLI::App* replay = AddReplay(app, requests.journal);
   const CLI::App* repair = AddRepair(app, requests.journal);
   const CLI::App* completion = AddCompletion(app, requests);
 
@@ -275,6 +276,7 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   if (watch->parsed()) return RunWatch(requests.watch, console);
   if (record->parsed()) return RunRecord(requests.journal.record, console);
   if (exported->parsed()) return RunExport(requests.journal.exported, console);
+  if (replay->parsed()) return RunReplay(requests.journal.replay, console);
   if (repair->parsed()) return RunRepair(requests.journal.repair, console);
   if (completion->parsed()) {
     console.out << (requests.shell == "bash" ? BashCompletion(app) : ZshCompletion(app));
