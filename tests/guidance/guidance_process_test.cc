@@ -1,0 +1,181 @@
+// The guidance process on DDS: what comes out for those who listen, and the journal it leaves.
+#include "guidance/app/guidance_process.h"
+
+#include <chrono>
+#include <mutex>
+#include <sstream>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "guidance/app/replay_command.h"
+#include "idl/cpp/publisher.h"
+#include "idl/cpp/subscriber.h"
+#include "tests/guidance/drive_messages.h"
+#include "tests/idl/dds_support.h"
+#include "tests/support/temp_folder.h"
+
+namespace tbm::test {
+namespace {
+
+using namespace std::chrono_literals;
+using dds::test::Eventually;
+using dds::test::OnLoopback;
+
+constexpr int kDomain = 180;
+
+// The camera box and the total station, as far as their topics go, now.
+class Neighbours {
+ public:
+  explicit Neighbours(const GuidedMachine& machine)
+      : drive_(machine, {}, "guidance process"), messages_(machine.machine) {
+    drive_.Measure(2100.0);
+  }
+
+  // The round of readings, as if it had ended now.
+  void Say() {
+    const Duration later = clock_.Now() - drive_.now();
+    for (GuidanceMessage message : messages_.From(drive_.inputs())) {
+      std::visit(
+          [&](auto& one) {
+            if constexpr (requires { one.sensed_at; }) one.sensed_at = one.sensed_at + later;
+            if constexpr (requires { one.published_at; }) {
+              one.published_at = one.published_at + later;
+            }
+            Write(one);
+          },
+          message);
+      std::this_thread::sleep_for(1ms);
+    }
+  }
+
+ private:
+  void Write(const dds::RelativePose& m) { poses_.Write(m); }
+  void Write(const dds::TiltReading& m) { tilts_.Write(m); }
+  void Write(const dds::StationObservation& m) { observations_.Write(m); }
+  void Write(const dds::StationSetUp& m) { set_ups_.Write(m); }
+  void Write(const dds::Command&) {}
+
+  SystemClock clock_;
+  Drive drive_;
+  DriveMessages messages_;
+  dds::Participant participant_{OnLoopback(kDomain, "neighbours")};
+  dds::Publisher<dds::RelativePose> poses_{participant_};
+  dds::Publisher<dds::TiltReading> tilts_{participant_};
+  dds::Publisher<dds::StationObservation> observations_{participant_};
+  dds::Publisher<dds::StationSetUp> set_ups_{participant_};
+};
+
+// Whoever steers.
+class Listener {
+ public:
+  dds::Guidance last() {
+    const std::lock_guard lock(mutex_);
+    return guidance_;
+  }
+  std::vector<dds::AlarmStatus> alarms() {
+    const std::lock_guard lock(mutex_);
+    return alarms_;
+  }
+  std::optional<dds::CommandReply> reply() {
+    const std::lock_guard lock(mutex_);
+    return reply_;
+  }
+  void Ask(const dds::Command& command) { commands_.Write(command); }
+  bool HearsCommands() { return commands_.matched_readers() > 0; }
+
+ private:
+  std::mutex mutex_;
+  dds::Guidance guidance_;
+  std::vector<dds::AlarmStatus> alarms_;
+  std::optional<dds::CommandReply> reply_;
+  dds::Participant participant_{OnLoopback(kDomain, "listener")};
+  dds::Publisher<dds::Command> commands_{participant_};
+  dds::Subscriber<dds::Guidance> guidances_{
+      participant_, [this](const dds::Guidance& m, const dds::SampleFacts&) {
+        const std::lock_guard lock(mutex_);
+        guidance_ = m;
+      }};
+  dds::Subscriber<dds::AlarmStatus> alarm_states_{
+      participant_, [this](const dds::AlarmStatus& m, const dds::SampleFacts&) {
+        const std::lock_guard lock(mutex_);
+        std::erase_if(alarms_, [&](const auto& known) { return known.code == m.code; });
+        alarms_.push_back(m);
+      }};
+  dds::Subscriber<dds::CommandReply> replies_{
+      participant_, [this](const dds::CommandReply& m, const dds::SampleFacts&) {
+        const std::lock_guard lock(mutex_);
+        reply_ = m;
+      }};
+};
+
+TEST(GuidanceProcess, GuidesFromItsNeighboursTopicsAndItsJournalReplaysBitForBit) {
+  const GuidedMachine machine = ExampleMachine();
+  TempFolder folder;
+  GuidanceConfig config;
+  config.journal_folder = folder / "journal";
+  Listener listener;
+  Neighbours neighbours(machine);
+  std::uint64_t steps = 0;
+  {
+    const SystemClock clock;
+    dds::Participant participant(OnLoopback(kDomain, "guidance"));
+    GuidanceProcess process(config, machine, participant, clock);
+    std::jthread thread([&](std::stop_token stop) { process.Run(stop); });
+
+    // Alone it says so, five times a second, and raises its alarms.
+    ASSERT_TRUE(Eventually([&] { return listener.last().sample_number > 5; }));
+    EXPECT_EQ(listener.last().validity, dds::Validity::kInvalid);
+    EXPECT_EQ(listener.last().reason.view(), "no_relative_pose");
+    const auto phase_of = [&](std::string_view code) {
+      for (const dds::AlarmStatus& alarm : listener.alarms()) {
+        if (alarm.code.view() == code) return alarm.phase;
+      }
+      return dds::AlarmPhase::kNormal;
+    };
+    ASSERT_TRUE(
+        Eventually([&] { return phase_of("position_lost") == dds::AlarmPhase::kUnacknowledged; }));
+
+    dds::Command command;
+    command.machine_id = std::string_view(machine.machine.machine_id);
+    command.request_id = "answer-1";
+    command.addressee = "guidance";
+    command.verb = "acknowledge";
+    command.argument = "position_lost";
+    command.by = "O. Perator";
+    command.issued_at = clock.Now();
+    command.expires_at = clock.Now() + 30s;
+    ASSERT_TRUE(Eventually([&] { return listener.HearsCommands(); }));
+    listener.Ask(command);
+    ASSERT_TRUE(Eventually([&] { return listener.reply().has_value(); }));
+    EXPECT_EQ(listener.reply()->outcome, dds::CommandOutcome::kDone);
+    EXPECT_TRUE(
+        Eventually([&] { return phase_of("position_lost") == dds::AlarmPhase::kAcknowledged; }));
+
+    // With them it knows where the machine is, and the alarm goes.
+    ASSERT_TRUE(Eventually([&] {
+      neighbours.Say();
+      return listener.last().validity == dds::Validity::kValid &&
+             phase_of("position_lost") == dds::AlarmPhase::kNormal;
+    }));
+    const dds::Guidance said = listener.last();
+    EXPECT_NEAR(said.points[0].chainage_m, 2100.0, 0.05);
+    EXPECT_LT(std::abs(said.points[0].deviation_right_m), 0.05);
+    // When they fall silent the numbers coast and say so.
+    ASSERT_TRUE(Eventually([&] { return listener.last().validity == dds::Validity::kDegraded; }));
+    EXPECT_EQ(listener.last().reason.view(), "camera_coasting");
+    steps = listener.last().sample_number;
+  }
+  std::ostringstream out;
+  std::ostringstream err;
+  EXPECT_EQ(RunReplay({{config.journal_folder}, {}}, {out, err}), ExitCode::kDone)
+      << out.str() << err.str();
+  EXPECT_THAT(out.str(), testing::HasSubstr("bit for bit"));
+  EXPECT_THAT(out.str(), testing::HasSubstr("1 starts of the guidance"));
+  EXPECT_GT(steps, 20u);
+}
+
+}  // namespace
+}  // namespace tbm::test
