@@ -134,7 +134,7 @@ std::optional<Timestamp> UtcFromText(std::string_view text) {
   std::int64_t ns = 0;
   if (Take(text, '.')) {
     const std::size_t decimals = std::min<std::size_t>(9, text.find_first_not_of("0123456789"));
-    ns = TakeDigits(text, decimals);
+    ns = decimals == 0 ? -1 : TakeDigits(text, decimals);
     for (std::size_t i = decimals; i < 9; ++i) ns *= 10;
   }
   const bool has_all = has_month && has_day && has_time && has_minute && has_second && text == "Z";
