@@ -197,11 +197,11 @@ void JournalReplay::CompareShield(BytesView data) {
 
 void JournalReplay::CompareAlarm(BytesView data) {
   const auto said = Decoded<dds::AlarmStatus>(data);
-  if (!said || run_->output == nullptr) {
+  if (!said) {
     ++report_.unreadable;
     return;
   }
-  if (said->source.view() != kGuidanceSource) return;
+  if (said->source.view() != kGuidanceSource || run_->output == nullptr) return;
   const auto& alarms = run_->output->alarms;
   std::optional<dds::AlarmStatus> now;
   if (run_->alarms_seen < alarms.size()) now = alarms[run_->alarms_seen++];
