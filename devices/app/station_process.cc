@@ -309,7 +309,9 @@ void StationProcess::Conclude() {
   for (int i = 0; i < static_cast<int>(keeper_.options().prisms.size()); ++i) {
     const std::string& name = keeper_.options().prisms[static_cast<std::size_t>(i)].name;
     missed = std::max(missed, keeper_.times_missed(i));
-    if (keeper_.times_missed(i) >= config_.missed_rounds) list(missing, name);
+    if (keeper_.times_missed(i) >= config_.missed_rounds) {
+      list(missing, fmt::format("{} ({})", name, keeper_.missed_because(i)));
+    }
     const auto& judged = keeper_.judged(i);
     if (!judged) continue;
     std::string what = name;

@@ -19,6 +19,7 @@ StationKeeper::StationKeeper(KeeperOptions options)
     : options_(std::move(options)),
       watch_(options_.prisms, options_.watch),
       missed_(options_.prisms.size()),
+      missed_because_(options_.prisms.size()),
       judged_(options_.prisms.size()),
       latest_(options_.prisms.size()) {
   for (const NamedReference& named : options_.references) references_.push_back(named.reference);
@@ -273,7 +274,10 @@ Judged StationKeeper::Take(const Pointed& pointed) {
   const bool is_prism = judged.target.kind == TargetKind::kPrism;
   if (!pointed.failure.empty()) {
     judged.reason = pointed.failure;
-    if (is_prism) ++missed_[static_cast<std::size_t>(judged.target.index)];
+    if (is_prism) {
+      ++missed_[static_cast<std::size_t>(judged.target.index)];
+      missed_because_[static_cast<std::size_t>(judged.target.index)] = pointed.failure;
+    }
     return judged;
   }
   if (!first_reading_at_) first_reading_at_ = pointed.at;

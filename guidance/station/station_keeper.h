@@ -179,6 +179,9 @@ class StationKeeper {
   std::vector<std::string> moved_references() const;
   // For an alarm: how often in a row a prism was not found, and how it was last judged.
   int times_missed(int prism) const { return missed_[static_cast<std::size_t>(prism)]; }
+  const std::string& missed_because(int prism) const {
+    return missed_because_[static_cast<std::size_t>(prism)];
+  }
   const std::optional<PrismJudgement>& judged(int prism) const {
     return judged_[static_cast<std::size_t>(prism)];
   }
@@ -260,6 +263,7 @@ class StationKeeper {
   std::vector<int> must_be_seen_;  // by the check that lifts a doubt
   int checks_missed_ = 0;
   std::vector<int> missed_;
+  std::vector<std::string> missed_because_;
   std::vector<std::optional<PrismJudgement>> judged_;
   std::vector<std::optional<ControlPoint>> latest_;  // prisms by the set-up in use
   std::vector<ControlPoint> new_controls_;           // the prisms by the proposed set-up
