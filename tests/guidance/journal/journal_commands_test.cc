@@ -477,6 +477,8 @@ TEST(Export, DamageIsToldAndTheRestExported) {
   EXPECT_THAT(outcome.err, HasSubstr("empty.mcap: is empty"));
   EXPECT_EQ(Table(folder / "2/event.csv").row_count(), 2u);
 
+  outcome = Export({{folder / "other.mcap", folder / "cut.mcap"}, folder / "4", {}, "", "", false});
+  EXPECT_EQ(outcome.code, ExitCode::kBadInput);
   outcome = Export({{folder / "other.mcap", folder / "cut.mcap", folder / "none.mcap"},
                     folder / "3",
                     {},

@@ -200,6 +200,9 @@ TEST(JournalFolder, ANewFileBeginsByTime) {
        {"journal_20261123T140500Z_001",
         "journal_20261123T235959Z_002",
         "journal_20261124T000000Z_003"}},
+      {"when the clock goes back behind the newest",
+       {0, 100, 40, 41},
+       {"journal_20261123T140500Z_001", "journal_20261123T140540Z_002"}},
       {"when the clock goes back",
        {100, 101, 40, 41},
        {"journal_20261123T140640Z_001", "journal_20261123T140540Z_002"}},
@@ -263,7 +266,7 @@ TEST(JournalFolder, TheOldestFilesGoAndNeverTheOneBeingWritten) {
     for (const JournalFile& file : JournalFilesIn(folder.path())) bytes += file.bytes;
     EXPECT_LE(bytes, 80'000);
     EXPECT_EQ(bytes, journal.status().total_bytes);
-    EXPECT_TRUE(fs::exists(journal.status().file));
+    EXPECT_EQ(JournalFilesIn(folder.path()).back().path, journal.status().file);
   }
   const JournalStatus status = journal.status();
   EXPECT_GT(status.files_deleted, 10u);
@@ -273,6 +276,9 @@ TEST(JournalFolder, TheOldestFilesGoAndNeverTheOneBeingWritten) {
   EXPECT_EQ(lines.back().sequence, 100u);
   EXPECT_EQ(lines.front().sequence, 100 - lines.size() + 1);
   EXPECT_GE(lines.size(), 25u);
+  const std::vector<JournalFile> files = JournalFilesIn(folder.path());
+  EXPECT_EQ(files.back().number, status.files_begun);
+  EXPECT_EQ(files.front().number, status.files_deleted + 1);
 
   // One message is more than all files may have: it is written all the same.
   options.folder = folder / "small";
@@ -321,6 +327,26 @@ TEST(JournalFolder, WhatTheDiskDoesNotTakeWaitsAndThenDrops) {
   // The gap in the sequence numbers is what was dropped.
   EXPECT_EQ(lines[taken - 1].sequence, taken);
   EXPECT_EQ(lines[taken], (Line{"local/note", 101, "after"}));
+}
+
+// The disk comes back and nobody has noticed yet: the end is the last chance, for what failed and
+// for what came after it.
+TEST(JournalFolder, AtTheEndEverythingIsTriedOnceMore) {
+  const TempFolder folder;
+  test::WriteText(folder / "in_the_way", "a file where the folder should be");
+  JournalOptions options = OptionsFor(folder / "in_the_way");
+  options.chunk_max_bytes = 2000;
+  options.retry_after = 1h;
+  Journal journal(options);
+  const auto notes = journal.AddChannel(kNotes);
+  const std::string text(3000, 'x');
+  journal.Add(notes, View(text), {kStart}, {kStart});
+  ASSERT_TRUE(Becomes([&] { return journal.status().state == JournalState::kFailed; }));
+  journal.Add(notes, View(text), {kStart}, {kStart});
+  fs::remove(folder / "in_the_way");
+  journal.Close();
+  EXPECT_EQ(ReadAll(folder / "in_the_way").size(), 2u);
+  EXPECT_EQ(journal.status().messages_dropped, 0u);
 }
 
 TEST(JournalFolder, AFolderThatIsTakenAwayIsMadeAgain) {
