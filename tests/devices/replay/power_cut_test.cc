@@ -1,7 +1,5 @@
 // The mains go while the box records: what reached the disk by then has to hold every frame older
-// than a second, and to be readable. The disk is a file with a journalling file system in it; a cut
-// is a copy of that file, taken while the writer stands still and nothing has been flushed for the
-// occasion.
+// than a second, and to be readable.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -20,6 +18,7 @@
 
 #include "devices/replay/run_reader.h"
 #include "devices/replay/run_writer.h"
+#include "tests/support/loop_disk.h"
 #include "tests/support/random.h"
 #include "tests/support/temp_folder.h"
 
@@ -28,32 +27,11 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
+using test::LoopDisk;
+using test::Runs;
 using test::TempFolder;
 
 constexpr int kFramesPerSecond = 10;
-
-bool Runs(const std::string& command) { return std::system(command.c_str()) == 0; }
-
-// An ext4 in a file, mounted by a loop device.
-class Disk {
- public:
-  Disk(std::string file, std::string place) : file_(std::move(file)), place_(std::move(place)) {
-    fs::create_directories(place_);
-    is_mounted_ = Runs("mount -o loop '" + file_ + "' '" + place_ + "' 2>/dev/null");
-  }
-  ~Disk() {
-    if (is_mounted_) Runs("umount '" + place_ + "'");
-  }
-  Disk(const Disk&) = delete;
-  Disk& operator=(const Disk&) = delete;
-  bool is_mounted() const { return is_mounted_; }
-  const std::string& place() const { return place_; }
-
- private:
-  std::string file_;
-  std::string place_;
-  bool is_mounted_ = false;
-};
 
 // Until it is killed. `frames` is in memory shared with the test.
 [[noreturn]] void RecordForEver(const std::string& folder, std::atomic<int>* frames) {
@@ -80,8 +58,8 @@ TEST(PowerCut, LosesAtMostTheLastSecondAndWhatRemainsIsReadable) {
   if (geteuid() != 0) GTEST_SKIP() << "mounting a disk needs root";
   const TempFolder folder;
   const std::string file = folder / "disk";
-  ASSERT_TRUE(Runs("truncate -s 160M '" + file + "' && mkfs.ext4 -q '" + file + "'"));
-  const Disk disk(file, folder / "mounted");
+  ASSERT_TRUE(LoopDisk::Make(file, "160M"));
+  const LoopDisk disk(file, folder / "mounted");
   if (!disk.is_mounted()) GTEST_SKIP() << "no loop device to be had";
 
   void* const shared = mmap(
@@ -107,7 +85,7 @@ TEST(PowerCut, LosesAtMostTheLastSecondAndWhatRemainsIsReadable) {
 
   for (std::size_t cut = 0; cut < frames_at_cut.size(); ++cut) {
     const std::string name = "cut" + std::to_string(cut);
-    const Disk after(folder / name, folder / (name + "_mounted"));
+    const LoopDisk after(folder / name, folder / (name + "_mounted"));
     ASSERT_TRUE(after.is_mounted()) << name;
     const int written = frames_at_cut[cut];
     std::string run_folder;

@@ -1,5 +1,7 @@
 // The journal in its folder: what reaches the disk, when a new file begins, which one goes, and
 // what happens while the disk is not to be had.
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -9,11 +11,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "guidance/app/journal.h"
 #include "guidance/app/journal_files.h"
 #include "guidance/journal/mcap_reader.h"
+#include "tests/support/loop_disk.h"
+#include "tests/support/random.h"
 #include "tests/support/temp_folder.h"
 
 namespace tbm {
@@ -436,6 +443,77 @@ TEST(JournalFolder, ManyThreadsLoseNothing) {
   }
   EXPECT_EQ(next.size(), static_cast<std::size_t>(kThreads));
   for (const auto& [topic, count] : next) EXPECT_EQ(count, kEach) << topic;
+}
+
+// Until it is killed, a message each millisecond and a new file often. `on_disk` is in memory
+// shared with the test: how many messages the journal has said to be on the disk.
+[[noreturn]] void WriteForEver(const std::string& folder, std::atomic<std::uint64_t>* on_disk) {
+  JournalOptions options = OptionsFor(folder);
+  options.chunk_max_age = 20ms;
+  options.file_max_duration = 500ms;
+  Journal journal(options);
+  const auto notes = journal.AddChannel(kNotes);
+  for (int i = 1;; ++i) {
+    if (!journal.Add(notes, View(std::to_string(i)), {kStart + i * 1'000'000}, {kStart})) {
+      std::_Exit(1);
+    }
+    on_disk->store(journal.status().messages_written);
+    std::this_thread::sleep_for(1ms);
+  }
+}
+
+// The mains go while the journal is written: what was said to be on the disk is there, each message
+// once and in order.
+TEST(JournalPowerCut, WhatWasSaidToBeOnTheDiskIsThere) {
+  if (geteuid() != 0) GTEST_SKIP() << "mounting a disk needs root";
+  const TempFolder folder;
+  const std::string file = folder / "disk";
+  ASSERT_TRUE(test::LoopDisk::Make(file, "32M"));
+  const test::LoopDisk disk(file, folder / "mounted");
+  if (!disk.is_mounted()) GTEST_SKIP() << "no loop device to be had";
+
+  using Shared = std::atomic<std::uint64_t>;
+  void* const shared =
+      mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(shared, MAP_FAILED);
+  auto* const on_disk = new (shared) Shared(0);
+  const pid_t writer = fork();
+  if (writer == 0) WriteForEver(disk.place() + "/journal", on_disk);
+
+  test::Random random("JournalPowerCut");
+  std::array<std::uint64_t, 6> on_disk_at_cut{};
+  for (std::size_t cut = 0; cut < on_disk_at_cut.size(); ++cut) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200 + random.Index(500)));
+    kill(writer, SIGSTOP);
+    on_disk_at_cut[cut] = on_disk->load();
+    const std::string copy = folder / ("cut" + std::to_string(cut));
+    ASSERT_TRUE(test::Runs("cp '" + file + "' '" + copy + "'"));
+    kill(writer, SIGCONT);
+  }
+  kill(writer, SIGKILL);
+  int status = 0;
+  waitpid(writer, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status)) << "the writer ended by itself with " << WEXITSTATUS(status);
+
+  for (std::size_t cut = 0; cut < on_disk_at_cut.size(); ++cut) {
+    const std::string name = "cut" + std::to_string(cut);
+    SCOPED_TRACE(name);
+    const test::LoopDisk after(folder / name, folder / (name + "_mounted"));
+    ASSERT_TRUE(after.is_mounted());
+    std::uint64_t read = 0;
+    for (const JournalFile& journal : JournalFilesIn(after.place() + "/journal")) {
+      const std::string bytes = test::ReadText(journal.path);
+      // The mains went between the name and the first bytes.
+      if (bytes.size() < mcap::kMagic.size()) continue;
+      const auto content = ReadMcap(View(bytes), [&](const McapChannel&, const McapMessage& m) {
+        EXPECT_EQ(Text(m.data), std::to_string(++read));
+      });
+      ASSERT_TRUE(content);
+      EXPECT_LE(content->damages.size(), 1u);
+    }
+    EXPECT_GE(read, on_disk_at_cut[cut]);
+    EXPECT_GT(on_disk_at_cut[cut], 50u);
+  }
 }
 
 }  // namespace
