@@ -1,12 +1,12 @@
 # Debian packages, made by tools/package/build:
 #   tbm-camera-box   what runs on the box: the program, its unit, its configuration (any architecture)
-#   tbm-tools        the PC's side: tbm, tbm_sim, camera_sim
+#   tbm-tools        the PC's side: guidance, total_station, tbm, the simulators
 # Included at the end of the root CMakeLists.txt.
 
 set(package_dir ${CMAKE_CURRENT_LIST_DIR})
 
 # Only what is used becomes a dependency.
-foreach(program camera_box tbm tbm_sim camera_sim)
+foreach(program camera_box guidance total_station tbm tbm_sim camera_sim total_station_sim)
   if(TARGET ${program})
     target_link_options(${program} PRIVATE -Wl,--as-needed)
   endif()
@@ -34,10 +34,13 @@ install(FILES ${package_dir}/box/serial.rules
 set(package_components camera_box)
 if(NOT CMAKE_CROSSCOMPILING)
   list(APPEND package_components tools)
-  install(TARGETS tbm tbm_sim camera_sim total_station_sim RUNTIME DESTINATION bin COMPONENT tools)
+  install(TARGETS guidance total_station tbm tbm_sim camera_sim total_station_sim
+    RUNTIME DESTINATION bin COMPONENT tools)
   install(FILES ${PROJECT_SOURCE_DIR}/README.md DESTINATION share/doc/tbm-tools COMPONENT tools)
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/pose/app/example
-    DESTINATION share/doc/tbm-tools COMPONENT tools)
+  foreach(part pose devices guidance)
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/${part}/app/example
+      DESTINATION share/doc/tbm-tools COMPONENT tools)
+  endforeach()
   foreach(shell_and_file "bash;bash-completion/completions/tbm" "zsh;vendor-completions/_tbm")
     list(GET shell_and_file 0 shell)
     list(GET shell_and_file 1 file)
@@ -103,8 +106,10 @@ set(tools_depends
   "libpugixml1v5 (>= 1.13)"
   "libssl3 (>= 3.0.0)"
   "libstdc++6 (>= 12)"
+  "libsystemd0 (>= 246)"
   "libtiff6 (>= 4.5.0)"
-  "libyaml-cpp0.7 (>= 0.7.0)")
+  "libyaml-cpp0.7 (>= 0.7.0)"
+  "zlib1g (>= 1:1.2.13)")
 list(JOIN camera_box_depends ", " camera_box_depends)
 list(JOIN tools_depends ", " tools_depends)
 
@@ -127,9 +132,10 @@ set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "${tools_depends}")
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SUGGESTS "gnuplot-nox")
 set(CPACK_COMPONENT_TOOLS_DESCRIPTION
-"work with recorded and live poses of a tunnel boring machine
-tbm solves recorded runs, compares with a total station and shows the live
-system; tbm_sim and camera_sim simulate the machine's camera and
-inclinometers on the network and on serial lines.")
+"guidance of a tunnel boring machine, and the surveyor's tools
+guidance and total_station say on DDS where both shields are against the
+design axis, and keep a journal; tbm solves recorded runs, checks against a
+total station, shows the live system and works on journals; the simulators
+stand in for camera, inclinometers and total station.")
 
 include(CPack)
