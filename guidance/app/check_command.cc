@@ -251,6 +251,10 @@ Result<Pairs, std::string> ReadPairs(const CheckRequest& request, const Console&
 }  // namespace
 
 ExitCode RunCheck(const CheckRequest& request, const Console& console) {
+  if (request.point.empty()) {
+    Complain(console, "--point: which point of rig.yaml, such as shield_head, is to be compared?");
+    return ExitCode::kBadInput;
+  }
   if (const auto fault = ReportObstacle(request)) {
     Complain(console, *fault);
     return ExitCode::kBadInput;

@@ -15,6 +15,11 @@ struct CheckRequest {
   bool align_rigid = false;
   double tolerance_ms = 500.0;
   std::string report;  // folder; empty: only print
+  // Of a record of guidance only.
+  std::string clock = "auto";     // auto, estimate, trust: what is done about the log's clock
+  double clock_range_s = 7200.0;  // it is looked for within
+  double log_sigma_mm = 0.0;      // of each coordinate of a shot
+  std::string at;                 // time of shots that have none; empty: they must have one
   bool force = false;
 };
 

@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 
 #include "guidance/app/axis_options.h"
+#include "guidance/app/chain_command.h"
+#include "guidance/app/chain_input.h"
 #include "guidance/app/check_command.h"
 #include "guidance/app/completion.h"
 #include "guidance/app/journal_options.h"
@@ -93,9 +95,25 @@ constexpr const char* kCheckHelp =
     "least four\n"
     "placements are needed for the remaining differences to say anything.\n"
     "\n"
-    "Example\n"
+    "POSES may also be what guidance published: its journal (*.mcap, or the folder), or the "
+    "guidance.csv of\n"
+    "tbm export. LOG then holds independent shots at points of the machine, in site, and each is "
+    "compared\n"
+    "with the position interpolated to its time: never beyond the record, and never across a time "
+    "in which\n"
+    "guidance said that it knows nothing. Besides the differences it is said how many lie inside "
+    "the\n"
+    "published 95 % ellipsoid. How far the log's clock is off is estimated where the machine moved "
+    "enough to\n"
+    "tell: --clock auto takes that out when it is more than three sigma, estimate always, trust "
+    "never. Shots\n"
+    "without a time (GSI) take that of --at.\n"
+    "\n"
+    "Examples\n"
     "  tbm check poses.csv station.gsi --point shield_head --align rigid --report report\n"
-    "      writes report/check.csv, check.json and check.png";
+    "      writes report/check.csv, check.json and check.png\n"
+    "  tbm check journal shots.csv --report report\n"
+    "      every point that guidance and the log both know";
 
 constexpr const char* kStudyHelp =
     "Repeats the simulation of the pose paper's section 4.1 (its lens and LEDs, 4 m, 0.1 to 1 px) "
@@ -177,9 +195,12 @@ CLI::App* AddCheck(CLI::App& app, Requests& requests) {
   CheckRequest& request = requests.check;
   CLI::App* check = app.add_subcommand("check", "Poses against a total station");
   check->footer(kCheckHelp);
-  check->add_option("POSES", request.poses, "file of tbm solve")->required();
+  check->add_option("POSES", request.poses, "file of tbm solve, or a record of guidance")
+      ->required();
   check->add_option("LOG", request.log, "total station's file: CSV or Leica GSI")->required();
-  check->add_option("--point", request.point, "point of rig.yaml, such as shield_head")->required();
+  check->add_option("--point",
+                    request.point,
+                    "point of rig.yaml, such as shield_head, or of machine.yaml; there, none: all");
   check->add_option("--log-point", request.log_point, "its name in LOG, when that is another");
   check->add_option("--align", requests.align, "fit the two frames to each other first")
       ->check(CLI::IsMember({"none", "rigid"}))
@@ -189,6 +210,16 @@ CLI::App* AddCheck(CLI::App& app, Requests& requests) {
           "--tolerance-ms", request.tolerance_ms, "furthest pose that may stand for a survey row")
       ->check(CLI::Range(0.0, 86'400'000.0))
       ->capture_default_str();
+  check->add_option("--clock", request.clock, "take an error of the log's clock out: guidance only")
+      ->check(CLI::IsMember({"auto", "estimate", "trust"}))
+      ->capture_default_str();
+  check->add_option("--clock-range-s", request.clock_range_s, "how far off it may be")
+      ->check(CLI::Range(0.0, 100'000.0))
+      ->capture_default_str();
+  check->add_option("--log-sigma-mm", request.log_sigma_mm, "of each coordinate of a shot")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  check->add_option("--at", request.at, "time of shots without one: UTC, the machine standing");
   check->add_option("--report", request.report, "folder for check.csv, check.json and check.png");
   check->add_flag("--force,-f", request.force, "replace existing files");
   return check;
@@ -214,7 +245,8 @@ CLI::App* AddStudy(CLI::App& app, Requests& requests) {
 
 CLI::App* AddWatch(CLI::App& app, Requests& requests) {
   WatchRequest& request = requests.watch;
-  CLI::App* watch = app.add_subcommand("watch", "Live values of a running camera box");
+  CLI::App* watch =
+      app.add_subcommand("watch", "Live: what the operator steers by, and all that it rests on");
   watch->footer(kWatchHelp);
   watch->add_option("--domain", request.domain_id, "DDS domain")
       ->check(CLI::Range(0, 232))
@@ -270,6 +302,9 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   requests.check.align_rigid = requests.align == "rigid";
   if (solve->parsed()) return RunSolve(requests.solve, console);
   if (centres->parsed()) return RunCentres(requests.centres, console);
+  if (check->parsed() && IsGuidanceRecord(requests.check.poses)) {
+    return RunChainCheck(requests.check, console);
+  }
   if (check->parsed()) return RunCheck(requests.check, console);
   if (axis->parsed()) return RunAxis(*axis, requests.axis, console);
   if (study->parsed()) return RunStudy(requests.study, console);
