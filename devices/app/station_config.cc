@@ -296,6 +296,7 @@ class Reader {
     section.Scaled("station_sigma_mm", 0.1, 100, "mm", kPerMm, &keeper.set_up.worst_sigma_m);
     section.Scaled(
         "orientation_sigma_arcsec", 0.5, 600, "arcsec", kPerArcsec, &keeper.set_up.worst_sigma_rad);
+    section.Scaled("gross_mm", 10, 10'000, "mm", kPerMm, &keeper.gross_m);
     section.Scaled("prism_floor_mm", 0.1, 100, "mm", kPerMm, &keeper.watch.floor_m);
     section.Scaled("machine_speed_mm_per_s",
                    0.01,

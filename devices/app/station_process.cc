@@ -146,11 +146,26 @@ void StationProcess::MeetInstrument(const StationIdentity& identity) {
   }
   serial_number_ = identity.serial_number;
   keeper_.SetInstrument(identity.serial_number);
-  // So that the instrument's own display is right. What it has really applied comes with each
-  // observation, and the rest is added here.
-  (void)instrument_.SetPrismConstant(config_.prism_constant_m);
-  (void)instrument_.SetAtmosphere(AirCorrection_ppm(config_.distance.air, config_.distance.meter));
+  is_constant_set_ = is_air_set_ = false;
   (void)instrument_.ReadPower();
+}
+
+// So that the instrument's own display is right. What it has really applied comes with each
+// observation, and the rest is added here: whatever the instrument refuses may stay as it is, but
+// what got lost on the line is told again, because what it then applies nobody knows.
+void StationProcess::ApplySettings() {
+  const auto is_settled = [](const Result<Done, StationFault>& result) {
+    return result || result.error().why == StationFailure::kSettingNotTaken ||
+           result.error().why == StationFailure::kNotSupported ||
+           result.error().why == StationFailure::kBadParameter;
+  };
+  if (!is_constant_set_) {
+    is_constant_set_ = is_settled(instrument_.SetPrismConstant(config_.prism_constant_m));
+  }
+  if (!is_air_set_) {
+    is_air_set_ = is_settled(
+        instrument_.SetAtmosphere(AirCorrection_ppm(config_.distance.air, config_.distance.meter)));
+  }
 }
 
 void StationProcess::Step(const std::function<bool()>& is_ending) {
@@ -179,9 +194,11 @@ void StationProcess::Idle() {
 }
 
 void StationProcess::Measure(const Pointing& pointing, const std::function<bool()>& is_ending) {
+  ApplySettings();
   StationPointer pointer(config_, instrument_, clock_, is_ending);
   const StationPointer::Outcome outcome = pointer.Carry(pointing);
   if (is_ending()) return;
+  if (outcome.pointed.doubt == "setting_unknown") is_constant_set_ = is_air_set_ = false;
   Judged judged;
   if (outcome.is_gone) {
     // Told again when it is back.

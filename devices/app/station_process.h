@@ -73,6 +73,7 @@ class StationProcess {
 
   bool StayConnected();
   void MeetInstrument(const StationIdentity& identity);
+  void ApplySettings();
   void Idle();
   void Measure(const Pointing& pointing, const std::function<bool()>& is_ending);
   void Tell(const Judged& judged, const StationPointer::Outcome& outcome);
@@ -100,6 +101,8 @@ class StationProcess {
   std::vector<Pending> pending_;
   std::vector<std::string> answered_;  // the last requests, so that none is carried out twice
   std::optional<std::int64_t> serial_number_;
+  bool is_constant_set_ = false;
+  bool is_air_set_ = false;
   std::chrono::steady_clock::time_point answered_at_;
   std::chrono::steady_clock::time_point power_read_at_{};
   std::atomic<std::chrono::steady_clock::rep> step_at_{0};  // for the watchdog

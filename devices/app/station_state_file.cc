@@ -57,7 +57,10 @@ class Writer {
     const Eigen::Vector3d& p = kept.station.p_axes_in_site;
     Line("station_m_rad", p.x(), p.y(), p.z(), kept.station.circle_zero_bearing_rad);
     Numbers("covariance", std::vector<double>(kept.covariance.data(), kept.covariance.data() + 16));
-    Line("axis_errors_rad", kept.axis_errors.collimation_rad, kept.axis_errors.index_rad);
+    Line("axis_errors_rad",
+         kept.axis_errors.collimation_rad,
+         kept.axis_errors.index_rad,
+         kept.axis_sigma_rad);
     Line("times_ns", kept.set_up_at.ns, kept.last_good_check_at.ns);
     Line("fit", kept.chi2, kept.dof, kept.sees_m.value_or(std::nan("")), kept.instrument);
     for (const KeptReference& row : kept.references) {
@@ -202,11 +205,12 @@ class Reader {
     const bool is_covariance = kept->covariance.isApprox(kept->covariance.transpose(), 1e-6) &&
                                kept->covariance.diagonal().minCoeff() >= 0.0;
     if (!is_covariance) return Fail("the covariance is none");
-    std::array<double, 2> axis_errors{};
-    if (!Next() || !Is("axis_errors_rad", 2) || !Numbers(1, axis_errors)) {
-      return Fail("wanted axis_errors_rad and two numbers");
+    std::array<double, 3> axis_errors{};
+    if (!Next() || !Is("axis_errors_rad", 3) || !Numbers(1, axis_errors) || axis_errors[2] < 0.0) {
+      return Fail("wanted axis_errors_rad and three numbers");
     }
     kept->axis_errors = {axis_errors[0], axis_errors[1]};
+    kept->axis_sigma_rad = axis_errors[2];
     if (!Next() || !Is("times_ns", 2) || !Time(1, &kept->set_up_at) ||
         !Time(2, &kept->last_good_check_at)) {
       return Fail("wanted times_ns and two instants");

@@ -99,6 +99,7 @@ Result<Done, StationFault> GeocomTotalStation::SetPrismConstant(double constant_
   if (!before) return Failure{before.error()};
   prism_constant_m_ = *before;
   if (is_taken()) return Done{};
+  prism_constant_m_.reset();  // until it is read back, also when the answer to the setting is lost
   const auto set = PlainDone(geocom::kSetPrismConstant, GeocomNumber(constant_m));
   if (!set) return set;
   const auto after = ReadOneReal(geocom::kGetPrismConstant);
@@ -110,6 +111,7 @@ Result<Done, StationFault> GeocomTotalStation::SetPrismConstant(double constant_
 
 Result<Done, StationFault> GeocomTotalStation::SetAtmosphere(double ppm) {
   wanted_ppm_ = ppm;
+  ppm_.reset();
   const auto set = PlainDone(geocom::kSetAtmospherePpm, GeocomNumber(ppm));
   if (!set) return set;
   const auto after = ReadOneReal(geocom::kGetAtmospherePpm);

@@ -34,7 +34,8 @@ struct KeptSetUp {
   std::uint64_t number = 0;  // from 1, never used again
   Station station;
   StationCovariance covariance = StationCovariance::Zero();
-  AxisErrors axis_errors;  // of the instrument, as its two faces showed them
+  AxisErrors axis_errors;       // of the instrument, as its two faces showed them
+  double axis_sigma_rad = 0.0;  // of each of the two
   Timestamp set_up_at;
   Timestamp last_good_check_at;
   double chi2 = 0.0;

@@ -110,7 +110,8 @@ std::vector<SightedPrism> PrismWatch::Recent(Timestamp at) const {
 }
 
 // The turn that fits best, by the cross-covariance's singular vectors.
-bool PrismWatch::IsUpright(const std::vector<SightedPrism>& all, const std::vector<int>& names) const {
+bool PrismWatch::IsUpright(const std::vector<SightedPrism>& all,
+                           const std::vector<int>& names) const {
   if (!attitude_ || all.size() < 3) return true;
   Eigen::Vector3d mean_site = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_shield = Eigen::Vector3d::Zero();

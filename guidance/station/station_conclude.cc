@@ -99,50 +99,58 @@ void StationKeeper::EndRound(Timestamp now) {
   readings_.clear();
 }
 
-std::vector<ReferenceSighting> StationKeeper::Sightings(AxisErrors* axis_errors) const {
-  std::vector<ReferenceSighting> sightings;
+StationKeeper::RoundSightings StationKeeper::Sightings(const KeptSetUp* known) const {
+  RoundSightings round;
   std::vector<const Reading*> singles;
   AxisErrors sum;
   int pairs = 0;
-  for (const Reading& one : readings_) {
-    if (one.target.kind != TargetKind::kReference || one.face != Face::kOne) continue;
-    const auto two = std::ranges::find_if(readings_, [&](const Reading& other) {
-      return other.target == one.target && other.face == Face::kTwo;
+  for (const Reading& reading : readings_) {
+    const auto other = std::ranges::find_if(readings_, [&](const Reading& candidate) {
+      return candidate.target == reading.target && candidate.face != reading.face;
     });
-    if (two == readings_.end()) {
-      singles.push_back(&one);
+    if (other == readings_.end()) {
+      singles.push_back(&reading);
       continue;
     }
+    if (reading.face == Face::kTwo) continue;  // joined with face one
     const auto faces =
-        MeanOfFaces(one.raw, two->raw, one.to_be_added, options_.largest_axis_error_rad);
+        MeanOfFaces(reading.raw, other->raw, reading.to_be_added, options_.largest_axis_error_rad);
     if (!faces) continue;  // two different prisms
     sum.collimation_rad += faces->axis_errors.collimation_rad;
     sum.index_rad += faces->axis_errors.index_rad;
     ++pairs;
-    sightings.push_back({one.target.index, faces->mean, SigmaOf(faces->mean, true)});
+    round.sightings.push_back({reading.target.index, faces->mean, SigmaOf(faces->mean, {})});
   }
-  for (const Reading& two : readings_) {
-    if (two.face == Face::kOne || two.target.kind != TargetKind::kReference) continue;
-    const bool has_one = std::ranges::any_of(readings_, [&](const Reading& other) {
-      return other.target == two.target && other.face == Face::kOne;
-    });
-    if (!has_one) singles.push_back(&two);
+  AxisErrors axis_errors;
+  if (pairs > 0) {
+    round.shown = AxisErrors{sum.collimation_rad / pairs, sum.index_rad / pairs};
+    axis_errors = *round.shown;
+    round.axis_sigma_rad = options_.angle_sigma_rad * std::sqrt(0.5 / pairs);
+  } else if (known != nullptr) {
+    axis_errors = known->axis_errors;
+    round.axis_sigma_rad = known->axis_sigma_rad;
+  } else {
+    return round;
   }
-  if (pairs > 0) *axis_errors = {sum.collimation_rad / pairs, sum.index_rad / pairs};
   for (const Reading* single : singles) {
     Reduction reduction = single->to_be_added;
-    reduction.axis_errors = *axis_errors;
+    reduction.axis_errors = axis_errors;
     const PolarReading reading = Reduced(single->raw, reduction);
-    sightings.push_back({single->target.index, reading, SigmaOf(reading, false)});
+    round.sightings.push_back(
+        {single->target.index, reading, SigmaOf(reading, round.axis_sigma_rad)});
   }
-  return sightings;
+  return round;
 }
 
 Result<KeptSetUp, std::string> StationKeeper::Solve(const Station& start,
                                                     bool with_known,
                                                     Timestamp now) const {
   KeptSetUp kept;
-  kept.sightings = Sightings(&kept.axis_errors);
+  RoundSightings round = Sightings(nullptr);
+  if (!round.shown) return Failure{std::string("no reference was measured in both faces")};
+  kept.sightings = std::move(round.sightings);
+  kept.axis_errors = *round.shown;
+  kept.axis_sigma_rad = round.axis_sigma_rad;
   std::vector<int> controls;
   for (std::size_t i = 0; i < options_.references.size(); ++i) {
     if (options_.references[i].is_control) controls.push_back(static_cast<int>(i));
@@ -246,8 +254,8 @@ void StationKeeper::Settled(Timestamp now) {
 void StationKeeper::EndCheck(Timestamp now) {
   TBM_CHECK(state_.in_use.has_value());
   KeptSetUp& kept = *state_.in_use;
-  AxisErrors axis_errors = kept.axis_errors;
-  const auto all = Sightings(&axis_errors);
+  const RoundSightings round = Sightings(&kept);
+  const auto& all = round.sightings;
   const std::vector<int> moved = MovedIn(kept);
   // Only what the set-up has seen can be compared with it.
   std::vector<int> passed_over = moved;
@@ -281,6 +289,8 @@ void StationKeeper::EndCheck(Timestamp now) {
     CheckSaysNothing("check_weak");
   } else {
     CheckIsGood(check, seen);
+    // They drift with the instrument's temperature.
+    if (round.shown && round.axis_sigma_rad <= kept.axis_sigma_rad) kept.axis_errors = *round.shown;
     for (const int index : moved) {
       // It stands as at the set-up again: it counts from the next check on.
       auto with = seen;

@@ -255,11 +255,14 @@ void StationKeeper::WatchTheClock(Timestamp now) {
   if (now - state_.in_use->last_good_check_at > 2 * options_.check_period) Doubt("check_overdue");
 }
 
-PolarSigma StationKeeper::SigmaOf(const PolarReading& reading, bool both_faces) const {
-  const double share = both_faces ? std::sqrt(0.5) : 1.0;
+PolarSigma StationKeeper::SigmaOf(const PolarReading& reading,
+                                  std::optional<double> axis_sigma_rad) const {
+  const double share = axis_sigma_rad ? 1.0 : std::sqrt(0.5);
   const double slope_m = reading.slope_m.value_or(0.0);
-  return {share * options_.angle_sigma_rad / std::max(0.1, std::sin(reading.zenith_rad)),
-          share * options_.angle_sigma_rad,
+  const double angle_rad =
+      std::hypot(share * options_.angle_sigma_rad, axis_sigma_rad.value_or(0.0));
+  return {angle_rad / std::max(0.1, std::sin(reading.zenith_rad)),
+          angle_rad,
           share * std::hypot(options_.slope_sigma_m, 1e-6 * options_.slope_sigma_ppm * slope_m)};
 }
 
@@ -280,6 +283,10 @@ Judged StationKeeper::Take(const Pointed& pointed) {
     }
     return judged;
   }
+  if (!is_prism && IsAnotherPrism(judged.target, pointed)) {
+    judged.reason = "wrong_prism";
+    return judged;
+  }
   if (!first_reading_at_) first_reading_at_ = pointed.at;
   if (is_prism) missed_[static_cast<std::size_t>(judged.target.index)] = 0;
   readings_.push_back({judged.target, judged.face, pointed.at, pointed.raw, pointed.to_be_added});
@@ -298,6 +305,19 @@ Judged StationKeeper::Take(const Pointed& pointed) {
   return judged;
 }
 
+bool StationKeeper::IsAnotherPrism(const StationTarget& target, const Pointed& pointed) const {
+  const auto station = StationFor(round_);
+  if (!station) return false;
+  const PolarReading reading = Reduced(pointed.raw, pointed.to_be_added);
+  const auto p_in_site = PointSighted(*station, reading, options_.set_up.sight);
+  if (!p_in_site) return false;  // angles only
+  const Reference& reference = references_[static_cast<std::size_t>(target.index)];
+  const double off_m = (*p_in_site - reference.p_in_site).norm();
+  const bool is_rough = round_ == Round::kSetUp || round_ == Round::kMoveReferences;
+  const double turned_m = is_rough ? options_.start_within_rad * *reading.slope_m : 0.0;
+  return off_m > options_.gross_m + (is_rough ? options_.start_within_m + turned_m : 0.0);
+}
+
 Judged StationKeeper::Place(const Pointed& pointed, Judged judged) {
   const KeptSetUp& kept = *state_.in_use;
   Reduction reduction = pointed.to_be_added;
@@ -311,7 +331,8 @@ Judged StationKeeper::Place(const Pointed& pointed, Judged judged) {
     return judged;
   }
   judged.p_in_site = *p_in_site;
-  judged.covariance = CovarianceSighted(kept.station, *p_in_site, sight, SigmaOf(reading, false));
+  judged.covariance =
+      CovarianceSighted(kept.station, *p_in_site, sight, SigmaOf(reading, kept.axis_sigma_rad));
   judged.trust = pointed.doubt.empty() ? Trust::kGood : Trust::kDegraded;
   judged.reason = pointed.doubt;
   if (judged.target.kind == TargetKind::kReference) return judged;

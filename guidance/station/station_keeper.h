@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "guidance/station/prism_watch.h"
 #include "guidance/station/kept_station.h"
+#include "guidance/station/prism_watch.h"
 #include "pose/base/result.h"
 
 namespace tbm {
@@ -27,6 +27,9 @@ struct KeeperOptions {
   std::array<std::optional<double>, 4> known;
   double start_within_m = 3.0;  // a set-up that comes out further away has taken a wrong prism
   double start_within_rad = 0.1;
+  // A reference that reads further than this from where it belongs is another prism; in a set-up
+  // start_within_m comes on top.
+  double gross_m = 0.3;
   AimWindow window{0.05, 0.03};  // full width of a search when a target is not where it should be
   // Roughly where the rear shield stands, for the first look at its prisms.
   std::optional<Rigid3> shield_start;
@@ -43,7 +46,7 @@ struct KeeperOptions {
   Duration check_period = std::chrono::minutes(10);
   Duration doubt_period = std::chrono::seconds(60);  // between checks while the set-up is suspect
   Duration retry_period = std::chrono::seconds(30);  // between attempts at the first set-up
-  bool checks_in_two_faces = false;
+  bool checks_in_two_faces = true;
   // A check that could not have found a shift of so much says nothing.
   double must_see_m = 0.02;
   // A good check lifts a doubt only when it is as good as this: of unmoved ones one in twenty
@@ -205,13 +208,20 @@ class StationKeeper {
   void Begin(Round round, Timestamp now);
   std::optional<Pointing> Aimed(const StationTarget& target, Face face, Timestamp now);
   std::optional<Station> StationFor(Round round) const;
-  PolarSigma SigmaOf(const PolarReading& reading, bool both_faces) const;
-  // The references of the round, both faces joined where there are both. `axis_errors`: what single
-  // faces are corrected by; becomes what both faces show, where there are both.
-  std::vector<ReferenceSighting> Sightings(AxisErrors* axis_errors) const;
+  // `axis_sigma_rad` of a single face; empty: the mean of both, which is free of axis errors.
+  PolarSigma SigmaOf(const PolarReading& reading, std::optional<double> axis_sigma_rad) const;
+  // The references of the round, both faces joined where there are both, and what those show of the
+  // axis errors. Single faces are corrected by that, else by `known`, else left out.
+  struct RoundSightings {
+    std::vector<ReferenceSighting> sightings;
+    std::optional<AxisErrors> shown;
+    double axis_sigma_rad = 0.0;
+  };
+  RoundSightings Sightings(const KeptSetUp* known) const;
   std::optional<Round> Choose(Timestamp now) const;
   void WatchTheClock(Timestamp now);
   Judged Place(const Pointed& pointed, Judged judged);
+  bool IsAnotherPrism(const StationTarget& target, const Pointed& pointed) const;
 
   void EndRound(Timestamp now);
   void EndSetUp(Timestamp now);

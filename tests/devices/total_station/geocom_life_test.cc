@@ -104,6 +104,28 @@ TEST_F(GeocomLife, AnOldInstrumentIsMeasuredWithItsOwnCalls) {
   EXPECT_TRUE(station_->LockIn());
 }
 
+// Taken, and the answer lost: nobody may go on believing in the constant of before.
+TEST_F(GeocomLife, WhatADistanceHasInItIsNotToldWhileNobodyKnows) {
+  ASSERT_TRUE(Connect());
+  PointAt(0);
+  ASSERT_TRUE(station_->SetPrismConstant(0.0));
+  ASSERT_TRUE(station_->SetAtmosphere(0.0));
+  emulator_->faults().Add({GeocomFaultKind::kLostReply, geocom::kSetPrismConstant}, 2);
+  ASSERT_FALSE(station_->SetPrismConstant(0.0175));
+  emulator_->faults().Add({GeocomFaultKind::kLostReply, geocom::kSetAtmospherePpm}, 2);
+  ASSERT_FALSE(station_->SetAtmosphere(12.0));
+  auto observation = station_->Measure();
+  ASSERT_TRUE(observation);
+  EXPECT_FALSE(observation->prism_constant_m);
+  EXPECT_FALSE(observation->ppm);
+  ASSERT_TRUE(station_->SetPrismConstant(0.0175));
+  ASSERT_TRUE(station_->SetAtmosphere(12.0));
+  observation = station_->Measure();
+  ASSERT_TRUE(observation);
+  EXPECT_NEAR(observation->prism_constant_m.value(), 0.0175, 1e-9);
+  EXPECT_NEAR(observation->ppm.value(), 12.0, 1e-9);
+}
+
 TEST_F(GeocomLife, WithoutALicenceItMeasuresAndDoesNotTurn) {
   GeocomEmulatorOptions options;
   options.is_licensed = false;
