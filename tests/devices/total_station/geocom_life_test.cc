@@ -112,6 +112,7 @@ TEST_F(GeocomLife, WhatADistanceHasInItIsNotToldWhileNobodyKnows) {
   ASSERT_TRUE(station_->SetAtmosphere(0.0));
   emulator_->faults().Add({GeocomFaultKind::kLostReply, geocom::kSetPrismConstant}, 2);
   ASSERT_FALSE(station_->SetPrismConstant(0.0175));
+  ASSERT_TRUE(station_->ReadPower()) << "three without an answer would close the line";
   emulator_->faults().Add({GeocomFaultKind::kLostReply, geocom::kSetAtmospherePpm}, 2);
   ASSERT_FALSE(station_->SetAtmosphere(12.0));
   auto observation = station_->Measure();
