@@ -1,6 +1,9 @@
 #include "devices/app/reference_table.h"
 
 #include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
 
 #include "devices/replay/csv.h"
 
@@ -28,9 +31,14 @@ Result<std::vector<ReferenceRow>, std::string> ReadReferenceTable(const std::str
     row.sigma_m = value(i, "sigma_mm") * 1e-3;
     row.constant_m = value(i, "prism_constant_mm") * 1e-3;
     row.is_control = value(i, "control") != 0.0;
-    if (!(row.sigma_m >= 0.0 && row.sigma_m <= 0.1)) {
-      return Failure{path + ": reference " + row.name + ": sigma_mm must be 0 .. 100"};
-    }
+    const auto refuse = [&](std::string_view name, std::string what) {
+      if (!fault) fault = table->FaultAt(i, *table->Column(name), std::move(what));
+    };
+    if (!(row.sigma_m >= 0.0 && row.sigma_m <= 0.1)) refuse("sigma_mm", "allowed is 0 .. 100 mm");
+    if (!(std::abs(row.constant_m) <= 0.1))
+      refuse("prism_constant_mm", "allowed is -100 .. 100 mm");
+    if (!(row.p_in_site.cwiseAbs().maxCoeff() <= 1e8)) refuse("x_m", "a coordinate beyond 1e8 m");
+    if (row.is_control && value(i, "control") != 1.0) refuse("control", "wanted 0 or 1");
     rows.push_back(row);
   }
   if (fault) return Failure{fault->Text()};
