@@ -393,7 +393,7 @@ class Journal::Work {
     open_.reset();
   }
 
-  bool Stop(int error, const std::string& path) {
+  bool Stop(int error, std::string path) {  // a copy: it may be that of the file which is closed
     // Else each attempt would leave a file with nothing in it.
     if (open_ && !open_->has_chunk) ::unlink(open_->path.c_str());
     open_.reset();

@@ -1,11 +1,25 @@
 // Arbitrary bytes as a journal: what is read lies inside them, and a message that is handed out is
-// one of a channel that was declared.
+// one of a channel that was declared. What repair makes of them is whole and holds as much.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
 
 #include "guidance/journal/mcap_reader.h"
+#include "guidance/journal/mcap_repair.h"
+
+namespace {
+
+void RepairAndReadAgain(tbm::BytesView file) {
+  const auto repair = tbm::RepairMcap(file, "fuzz");
+  if (!repair) return;
+  const auto again = tbm::ReadMcap(repair->bytes, {});
+  if (!again || !again->has_footer || !again->damages.empty()) std::abort();
+  if (again->messages != repair->content.messages) std::abort();
+  if (repair->losses.size() < repair->content.damages.size()) std::abort();
+}
+
+}  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const tbm::BytesView file = std::as_bytes(std::span(data, size));
@@ -21,6 +35,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
           std::abort();
         }
       });
+  RepairAndReadAgain(file);
   if (!content) return 0;
   if (content->messages != messages || (messages > 0 && content->channels.empty())) std::abort();
   for (const tbm::McapDamage& damage : content->damages) {
