@@ -165,6 +165,7 @@ void GuidanceCore::PlaceRear() {
   const UncertainRigid3 then{fix->site_from_rear_shield, fix->covariance};
   GuidanceReason reason = GuidanceReason::kNone;
   if (station.freshness == Freshness::kCoasting) reason = GuidanceReason::kStationCoasting;
+  if (fix->dof <= 1) reason = GuidanceReason::kFewPrisms;
   if (fix->exchanged) reason = GuidanceReason::kPrismsExchanged;
   if (fix->left_out) reason = GuidanceReason::kPrismLeftOut;
   if (rear_.IsSuspect()) reason = GuidanceReason::kSetUpSuspect;

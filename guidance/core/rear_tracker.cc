@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "guidance/shield/attitude.h"
+
 namespace tbm {
 namespace {
 
@@ -89,6 +91,8 @@ void RearTracker::Fix(const TiltMean& camera_tilt) {
     problem.up = UpOfRearShield(rig_, machine_.geometry, tilt->inclination, sigma_rad);
   }
   if (!past_.empty()) problem.start = past_.back().fix.site_from_rear_shield;
+  // One prism and the tilt leave the heading open: the last one that was measured, grown old.
+  if (problem.fixes.size() == 1) problem.heading = EarlierHeading(newest);
   const auto fix = FixRearShield(problem, {});
   if (!fix) {
     trouble_ = ReasonOf(fix.error());
@@ -96,7 +100,21 @@ void RearTracker::Fix(const TiltMean& camera_tilt) {
   }
   trouble_ = GuidanceReason::kNone;
   if (past_.full()) past_.erase(0);
-  past_.push_back({*fix, newest});
+  past_.push_back({*fix, newest, !problem.heading});
+}
+
+std::optional<HeadingFix> RearTracker::EarlierHeading(Timestamp at) const {
+  for (std::size_t i = past_.size(); i-- > 0;) {
+    const PastFix& past = past_[i];
+    const double age_s = SecondsBetween(past.newest_reading, at);
+    if (!past.has_own_heading || !IsTrusted(past.newest_reading)) continue;
+    if (age_s < 0.0 || age_s > machine_.station.stale_after_s) return {};
+    const Rigid3& site_from_rear = past.fix.site_from_rear_shield;
+    const double variance = CovarianceOfAttitude({site_from_rear, past.fix.covariance})(0, 0);
+    const double turned_rad = machine_.coast.turn_rad_per_s * age_s;
+    return HeadingFix{HeadingOf(site_from_rear), std::sqrt(variance + turned_rad * turned_rad)};
+  }
+  return {};
 }
 
 const RearShieldFix* RearTracker::fix() const {

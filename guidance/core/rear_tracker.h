@@ -41,9 +41,11 @@ class RearTracker {
   struct PastFix {
     RearShieldFix fix;
     Timestamp newest_reading;
+    bool has_own_heading = true;  // not taken from an earlier fix
   };
 
   void Fix(const TiltMean& camera_tilt);
+  std::optional<HeadingFix> EarlierHeading(Timestamp at) const;
   bool IsTrusted(Timestamp sensed_at) const;
 
   const Machine& machine_;

@@ -44,6 +44,8 @@ std::string_view ReasonCode(GuidanceReason reason) {
       return "too_far_from_axis";
     case GuidanceReason::kAmbiguousChainage:
       return "ambiguous_chainage";
+    case GuidanceReason::kFewPrisms:
+      return "few_prisms";
   }
   return "";
 }

@@ -282,7 +282,7 @@ inline bool SameKey(const AlarmStatus& a, const AlarmStatus& b) {
 }
 inline bool SameKey(const Command& a, const Command& b) { return a.machine_id == b.machine_id; }
 inline bool SameKey(const CommandReply& a, const CommandReply& b) {
-  return a.machine_id == b.machine_id;
+  return a.machine_id == b.machine_id && a.source == b.source;
 }
 
 }  // namespace tbm::dds

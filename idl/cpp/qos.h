@@ -10,7 +10,8 @@ enum class QosClass {
   kMeasurement,  // a stream that is worth what its newest sample is worth
   kHealth,       // a standing state with a heartbeat
   kEvents,       // things that must not be missed
-  kRecord,       // single readings and requests: each counts, and none is worth anything later
+  kRecord,       // single readings: each counts, and none is worth anything later
+  kRequest,      // the same for what anybody may ask, and the answers
 };
 
 // What a class means. The same for writer and reader, so they always match.
@@ -32,6 +33,7 @@ struct QosRule {
   int depth;                           // samples kept per key
   int max_keys;                        // keys one reader or writer has room for
   std::chrono::milliseconds deadline;  // offered by writers and asked for by readers; 0: none
+  bool one_writer = true;              // for each key; a second one is a fault
 };
 
 constexpr QosRule RuleOf(QosClass qos_class) {
@@ -48,11 +50,13 @@ constexpr QosRule RuleOf(QosClass qos_class) {
     // A console that starts later sees the last eight of each kind. No deadline: no news is normal.
     case QosClass::kEvents:
       return {true, 8, 256, std::chrono::milliseconds(0)};
-    // Volatile: a command or a reading of an hour ago must not come to a process that starts now. 32
-    // deep: two rounds of readings over prisms and references. No deadline: they come when they
+    // Volatile: a command or a reading of an hour ago must not come to a process that starts now.
+    // 32 deep: two rounds of readings over prisms and references. No deadline: they come when they
     // come; that the instrument lives is said by its health.
     case QosClass::kRecord:
       return {false, 32, 16, std::chrono::milliseconds(0)};
+    case QosClass::kRequest:
+      return {false, 32, 16, std::chrono::milliseconds(0), false};
   }
   return {};
 }

@@ -47,7 +47,9 @@ std::string NameOfKey(const AlarmStatus& m) {
   return fmt::format("{}/{}/{}", m.machine_id.view(), m.source.view(), m.code.view());
 }
 std::string NameOfKey(const Command& m) { return std::string(m.machine_id.view()); }
-std::string NameOfKey(const CommandReply& m) { return std::string(m.machine_id.view()); }
+std::string NameOfKey(const CommandReply& m) {
+  return fmt::format("{}/{}", m.machine_id.view(), m.source.view());
+}
 
 KeyWatch::Id IdOf(const rtps::InstanceHandle_t& handle) {
   KeyWatch::Id id{};
@@ -176,7 +178,7 @@ class Subscriber<Message>::Impl final : public Endpoint, private fdds::DataReade
     SampleFacts facts;
     facts.received_at = std::chrono::steady_clock::now();
     facts.writer = IdOf(writer);
-    {
+    if (kRule.one_writer) {
       const std::lock_guard lock(watch_mutex_);
       facts.contested =
           watch_.Heard(IdOf(info.instance_handle), facts.writer, facts.received_at, [this] {

@@ -35,9 +35,9 @@ inline constexpr TopicRow kGuidanceTopic{
     "tbm/v1/guidance", "tbm::v1::Guidance", QosClass::kMeasurement};
 inline constexpr TopicRow kAlarmStatusTopic{
     "tbm/v1/alarm", "tbm::v1::AlarmStatus", QosClass::kHealth};
-inline constexpr TopicRow kCommandTopic{"tbm/v1/command", "tbm::v1::Command", QosClass::kRecord};
+inline constexpr TopicRow kCommandTopic{"tbm/v1/command", "tbm::v1::Command", QosClass::kRequest};
 inline constexpr TopicRow kCommandReplyTopic{
-    "tbm/v1/command_reply", "tbm::v1::CommandReply", QosClass::kRecord};
+    "tbm/v1/command_reply", "tbm::v1::CommandReply", QosClass::kRequest};
 
 inline constexpr std::array kTopics{kFrameFeaturesTopic,
                                     kInclinationTopic,

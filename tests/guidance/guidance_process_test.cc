@@ -163,6 +163,22 @@ TEST(GuidanceProcess, GuidesFromItsNeighboursTopicsAndItsJournalReplaysBitForBit
     const dds::Guidance said = listener.last();
     EXPECT_NEAR(said.points[0].chainage_m, 2100.0, 0.05);
     EXPECT_LT(std::abs(said.points[0].deviation_right_m), 0.05);
+    // A second camera box of the same name: neither is believed, and the numbers coast.
+    {
+      Neighbours rival(machine);
+      ASSERT_TRUE(Eventually([&] {
+        neighbours.Say();
+        rival.Say();
+        return listener.last().validity == dds::Validity::kDegraded;
+      }));
+      EXPECT_EQ(listener.last().reason.view(), "camera_coasting");
+    }
+    ASSERT_TRUE(Eventually(
+        [&] {
+          neighbours.Say();
+          return listener.last().validity == dds::Validity::kValid;
+        },
+        15s));
     // When they fall silent the numbers coast and say so.
     ASSERT_TRUE(Eventually([&] { return listener.last().validity == dds::Validity::kDegraded; }));
     EXPECT_EQ(listener.last().reason.view(), "camera_coasting");

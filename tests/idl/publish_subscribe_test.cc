@@ -7,6 +7,7 @@
 #include "idl/cpp/publisher.h"
 #include "idl/cpp/subscriber.h"
 #include "tests/idl/dds_support.h"
+#include "tests/idl/guidance_samples.h"
 #include "tests/idl/raw_endpoints.h"
 #include "tests/idl/samples.h"
 
@@ -39,6 +40,15 @@ TEST(OverTheWire, EveryFieldOfInclinationArrives) { ExpectToArriveWhole(FullTilt
 TEST(OverTheWire, EveryFieldOfRelativePoseArrives) { ExpectToArriveWhole(FullRelativePose()); }
 TEST(OverTheWire, EveryFieldOfDeviceHealthArrives) { ExpectToArriveWhole(FullDeviceHealth()); }
 TEST(OverTheWire, EveryFieldOfEventArrives) { ExpectToArriveWhole(FullEvent()); }
+TEST(OverTheWire, EveryFieldOfTheTopicsOfGuidanceArrives) {
+  ExpectToArriveWhole(FullStationObservation());
+  ExpectToArriveWhole(FullStationSetUp());
+  ExpectToArriveWhole(FullShieldPose());
+  ExpectToArriveWhole(FullGuidance());
+  ExpectToArriveWhole(FullAlarmStatus());
+  ExpectToArriveWhole(FullCommand());
+  ExpectToArriveWhole(FullCommandReply());
+}
 
 TEST(OverTheWire, APoseThatIsMissingArrivesAsNaNWithItsReason) {
   RelativePose none = FullRelativePose();
@@ -153,6 +163,29 @@ TEST(SecondPublisher, OfAnotherMachineIsNoRival) {
     EXPECT_FALSE(facts.contested);
   }
   EXPECT_EQ(alarms.Count(AlarmKind::kSecondWriter), 0);
+}
+
+// Consoles and tools ask one and the same process, and that is no fault.
+TEST(Contested, RequestsMayComeFromSeveralWriters) {
+  AlarmLog alarms;
+  Participant one(OnLoopback(kDomain, "one"));
+  Participant two(OnLoopback(kDomain, "two"));
+  Participant reading(OnLoopback(kDomain, "reading"), alarms.Handler());
+  Subscriber<Command> subscriber(reading);
+  Publisher<Command> from_one(one);
+  Publisher<Command> from_two(two);
+  ASSERT_TRUE(Eventually([&] { return subscriber.matched_writers() == 2; }));
+  for (int i = 0; i < 3; ++i) {
+    for (Publisher<Command>* publisher : {&from_one, &from_two}) {
+      ASSERT_TRUE(Eventually([&] { return publisher->matched_readers() == 1; }));
+      publisher->Write(FullCommand());
+      Command received;
+      SampleFacts facts;
+      ASSERT_TRUE(subscriber.Take(received, facts, 5s));
+      EXPECT_FALSE(facts.contested);
+    }
+  }
+  EXPECT_EQ(alarms.Count(AlarmKind::kSecondWriter), 0) << alarms.All();
 }
 
 TEST(Silence, IsFoundByTheReaderAndEndsWithTheNextSample) {

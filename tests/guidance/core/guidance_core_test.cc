@@ -258,6 +258,46 @@ TEST_F(Core, TwoPrismsTakenForEachOtherArePutRight) {
   EXPECT_LT((snapshot.rear.site_from_shield.b_from_a.translation - truth).norm(), 0.002);
 }
 
+// Only RS1 is in sight: with the tilt and the heading of a while ago the place is still measured.
+TEST_F(Core, OnePrismTheTiltAndAnEarlierHeadingPlaceTheRearShieldAndSayHowWeakThatIs) {
+  Begin();
+  const Rigid3 before = core_.snapshot().rear.site_from_shield.b_from_a;
+  auto inputs = Later(Without<SetUpKnown>(round_), seconds(100));
+  std::erase_if(inputs, [](const GuidanceInput& input) {
+    const auto* prism = std::get_if<PrismSeen>(&input);
+    return prism != nullptr && prism->prism != 0;
+  });
+  for (GuidanceInput& input : inputs) {
+    if (auto* prism = std::get_if<PrismSeen>(&input)) prism->p_in_site.z() += 0.02;
+  }
+  core_.Advance(inputs, at_ + seconds(100));
+  const ShieldState& rear = core_.snapshot().rear;
+  ASSERT_TRUE(core_.snapshot().fix);
+  EXPECT_EQ(core_.snapshot().fix->prisms_used, 1);
+  EXPECT_EQ(rear.worth, Worth::kDegraded);
+  EXPECT_EQ(rear.reason, GuidanceReason::kFewPrisms);
+  EXPECT_NEAR(rear.site_from_shield.b_from_a.translation.z() - before.translation.z(), 0.02, 0.002);
+  EXPECT_NEAR(HeadingOf(rear.site_from_shield.b_from_a), HeadingOf(before), 1e-6);
+  // The heading is as uncertain as it was, and what 100 s of the coasting law add.
+  const double grown_rad = 8e-7 * 88.0;
+  EXPECT_GT(std::sqrt(rear.attitude_covariance(0, 0)), 0.9 * grown_rad);
+  // A second look at one prism does not make the old heading newer.
+  const double sigma_rad = std::sqrt(rear.attitude_covariance(0, 0));
+  core_.Advance(Later(inputs, seconds(100)), at_ + seconds(200));
+  EXPECT_GT(std::sqrt(core_.snapshot().rear.attitude_covariance(0, 0)), 1.1 * sigma_rad);
+}
+
+TEST_F(Core, OnePrismWithoutAnyHeadingIsNoPose) {
+  auto inputs = round_;
+  std::erase_if(inputs, [](const GuidanceInput& input) {
+    const auto* prism = std::get_if<PrismSeen>(&input);
+    return prism != nullptr && prism->prism != 0;
+  });
+  core_.Advance(inputs, at_);
+  EXPECT_EQ(core_.snapshot().rear.worth, Worth::kInvalid);
+  EXPECT_EQ(core_.snapshot().rear.reason, GuidanceReason::kTooFewPrisms);
+}
+
 TEST_F(Core, LateAndDoubledInputsChangeNothing) {
   Begin();
   const Eigen::Vector3d said = Cutter().p_in_site.p;
