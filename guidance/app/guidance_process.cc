@@ -231,6 +231,25 @@ class GuidanceProcess::Impl {
                event.text.view());
   }
 
+  // What the process has to say of itself, beside its steps: `tbm replay` does not meet it.
+  void TellOwn(std::string_view source,
+               std::string_view code,
+               dds::Severity severity,
+               bool active,
+               const std::string& text) {
+    dds::Event event;
+    event.machine_id = std::string_view(machine_.machine.machine_id);
+    event.source = source;
+    event.code = code;
+    event.at = clock_.Now();
+    event.sample_number = ++own_event_number_;
+    event.severity = severity;
+    event.active = active;
+    event.text = std::string_view(text);
+    Tell(event);
+    if (record_) record_->events.Add(event, event.at);
+  }
+
   void TellHealth() {
     std::vector<dds::Alarm> reported;
     {
@@ -238,19 +257,11 @@ class GuidanceProcess::Impl {
       reported.swap(reported_);
     }
     for (const dds::Alarm& alarm : reported) {
-      dds::Event event;
-      event.machine_id = std::string_view(machine_.machine.machine_id);
-      event.source = "guidance_dds";
-      event.code = dds::AlarmCode(alarm.kind);
-      event.at = clock_.Now();
-      event.sample_number = ++dds_event_number_;
-      event.severity = dds::Severity::kWarning;
-      event.active = alarm.active;
-      const std::string text =
-          alarm.topic.empty() ? alarm.text : fmt::format("{}: {}", alarm.topic, alarm.text);
-      event.text = std::string_view(text);
-      Tell(event);
-      if (record_) record_->events.Add(event, event.at);
+      TellOwn("guidance_process",
+              dds::AlarmCode(alarm.kind),
+              dds::Severity::kWarning,
+              alarm.active,
+              alarm.topic.empty() ? alarm.text : fmt::format("{}: {}", alarm.topic, alarm.text));
     }
     WriteHealth("guidance", dds::DeviceState::kStreaming, started_at_, OwnHealth());
     if (record_) WriteHealth("journal", JournalDeviceState(), journal_since_, JournalHealth());
@@ -260,8 +271,15 @@ class GuidanceProcess::Impl {
     dds::DeviceHealth health;
     health.samples_good = guidance_.counters().written;
     health.samples_lost = inbox_.dropped();
+    health.errors = guidance_.counters().refused;
     if (health.samples_lost > 0) {
       health.detail = "messages came faster than steps are taken: the computer is too slow";
+    }
+    if (health.errors > 0) {
+      const std::string text =
+          fmt::format("samples break the contract and are not sent: {}; please report it",
+                      dds::FaultText(guidance_.counters().refused_because));
+      health.detail = std::string_view(text);
     }
     return health;
   }
@@ -271,8 +289,18 @@ class GuidanceProcess::Impl {
     const dds::DeviceState told = state == JournalState::kWriting ? dds::DeviceState::kStreaming
                                   : state == JournalState::kIdle  ? dds::DeviceState::kOpening
                                                                   : dds::DeviceState::kFault;
-    if (told != journal_state_) journal_since_ = clock_.Now();
+    if (told == journal_state_) return told;
+    const bool was_fault = journal_state_ == dds::DeviceState::kFault;
+    const bool is_fault = told == dds::DeviceState::kFault;
+    journal_since_ = clock_.Now();
     journal_state_ = told;
+    if (was_fault != is_fault) {
+      TellOwn("guidance_process",
+              "journal_not_written",
+              dds::Severity::kAlarm,
+              is_fault,
+              is_fault ? record_->journal.status().what : "the journal is written again");
+    }
     return told;
   }
   dds::DeviceHealth JournalHealth() const {
@@ -313,7 +341,7 @@ class GuidanceProcess::Impl {
   std::chrono::steady_clock::time_point health_due_{};
   dds::DeviceState journal_state_ = dds::DeviceState::kClosed;
   Timestamp journal_since_ = started_at_;
-  std::uint64_t dds_event_number_ = 0;
+  std::uint64_t own_event_number_ = 0;
   std::mutex alarm_mutex_;
   std::vector<dds::Alarm> reported_;
   // Last: they stop before what they write to.
