@@ -168,6 +168,7 @@ std::optional<Eigen::Vector3d> VelocityAt(const GuidedTrack& track, Timestamp at
   double sum_s2 = 0.0;
   Eigen::Vector3d sum_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d sum_sm = Eigen::Vector3d::Zero();
+  double sum_m2 = 0.0;
   std::optional<double> first_s;
   double last_s = 0.0;
   Eigen::Vector3d first_m;
@@ -185,9 +186,20 @@ std::optional<Eigen::Vector3d> VelocityAt(const GuidedTrack& track, Timestamp at
     sum_s2 += t_s * t_s;
     sum_m += p_m;
     sum_sm += t_s * p_m;
+    sum_m2 += p_m.squaredNorm();
   }
   if (!first_s || last_s - *first_s < kLeast_s) return std::nullopt;
-  return (sum_sm - sum_s / count * sum_m) / (sum_s2 - sum_s * sum_s / count);
+  const double spread_s2 = sum_s2 - sum_s * sum_s / count;
+  const Eigen::Vector3d velocity = (sum_sm - sum_s / count * sum_m) / spread_s2;
+  const double scatter_m2 =
+      sum_m2 - sum_m.squaredNorm() / count - velocity.squaredNorm() * spread_s2;
+  const double sigma_m_per_s =
+      std::sqrt(std::max(0.0, scatter_m2) / std::max(1.0, count - 2.0) / spread_s2);
+  constexpr double kStanding_m_per_s = 1e-4;
+  if (velocity.norm() < std::max(kStanding_m_per_s, 5.0 * sigma_m_per_s)) {
+    return Eigen::Vector3d::Zero();
+  }
+  return velocity;
 }
 
 Result<ClockEstimate, NoClockEstimate> EstimateClock(const GuidedTracks& tracks,

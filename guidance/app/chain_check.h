@@ -50,8 +50,9 @@ Result<GuidedPlace, NoGuidedPlace> PlaceAt(const GuidedTrack& track,
                                            Timestamp at,
                                            Duration most_gap);
 
-// How fast the point moves around a moment: the slope through what lies within 15 s. Empty with
-// less than 5 s of samples.
+// How fast the point moves around a moment: the slope through what lies within 15 s, and zero below
+// 6 mm/min or what the samples' own scatter makes of a machine that stands. Empty with less than 5
+// s of samples.
 std::optional<Eigen::Vector3d> VelocityAt(const GuidedTrack& track, Timestamp at);
 
 struct ChainOptions {

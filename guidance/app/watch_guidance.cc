@@ -348,11 +348,10 @@ void GuidanceBoard::AppendSetUps(const WatchNow& now, std::vector<WatchRow>& row
                                     set_up.references.end(),
                                     [](const dds::ReferenceState& one) { return one.used; });
     std::string value = fmt::format(
-        "set-up {} at {}, {} of {} references, checked {}",
+        "set-up {} at {}, references {}, checked {}",
         set_up.set_up_number > 0 ? std::to_string(set_up.set_up_number) : "--",
         Metres(set_up.position_in_site_m),
-        used,
-        set_up.references.size(),
+        set_up.references.empty() ? "--" : fmt::format("{} of {}", used, set_up.references.size()),
         set_up.last_good_check_at.ns >= 0
             ? AgeText(std::max(0.0, SecondsBetween(set_up.last_good_check_at, now.utc))) + " ago"
             : "--");

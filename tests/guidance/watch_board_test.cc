@@ -384,6 +384,8 @@ TEST(WatchBoard, AShieldAndASetUpShowTheirNumbers) {
   set_up.closure_worst_m = 0.0021;
   set_up.closure_tolerance_m = 0.005;
   set_up.closure_points = 3;
+  set_up.references.resize(2);
+  set_up.references[1].used = true;
   board.Add(set_up, kSteady);
   const WatchNow now = NowAfter(std::chrono::milliseconds(100));
   EXPECT_EQ(RowOf(board, now, "shield tbm7 front").value,
@@ -391,7 +393,7 @@ TEST(WatchBoard, AShieldAndASetUpShowTheirNumbers) {
             "99.1000 m, rests on 31 s ago");
   EXPECT_EQ(RowOf(board, now, "shield tbm7 front").sigma, "0.11 0.22");
   EXPECT_EQ(RowOf(board, now, "station tbm7 proposed").value,
-            "set-up 4 at 1017.8000 5017.7000 101.6000 m, 0 of 0 references, checked 5 min ago, "
+            "set-up 4 at 1017.8000 5017.7000 101.6000 m, references 1 of 2, checked 5 min ago, "
             "closure 2.1 of 5.0 mm at 3 points");
   EXPECT_EQ(RowOf(board, now, "station tbm7 proposed").sigma, "1.0 1.0 1.0");
 }
