@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -10,23 +9,14 @@
 
 #include "devices/app/end_signals.h"
 #include "guidance/app/exit_code.h"
-#include "guidance/config/guidance_file.h"
 #include "guidance/app/guidance_process.h"
-#include "idl/cpp/participant.h"
+#include "guidance/config/guidance_file.h"
+#include "idl/cpp/dds_process.h"
 #include "pose/app/service_manager.h"
 #include "pose/base/clock.h"
 
 namespace tbm {
 namespace {
-
-dds::ParticipantConfig ParticipantOf(const DdsNetwork& network, const std::string& machine_id) {
-  dds::ParticipantConfig config;
-  config.domain_id = network.domain;
-  config.name = "guidance " + machine_id;
-  config.interfaces = network.interfaces;
-  config.peers = network.initial_peers;
-  return config;
-}
 
 void Print(const std::vector<std::string>& lines) {
   for (const std::string& line : lines) fmt::print(stderr, "{}\n", line);
@@ -45,7 +35,8 @@ int Main(const std::string& config_file, bool check_only) {
     Print(machine.error());
     return static_cast<int>(ExitCode::kBadInput);
   }
-  const auto participant_config = ParticipantOf(config->dds, machine->machine.machine_id);
+  const auto participant_config =
+      dds::ParticipantOf(config->dds, "guidance " + machine->machine.machine_id);
   const auto problems = dds::Problems(participant_config);
   for (const std::string& problem : problems) {
     fmt::print(stderr, "{}: dds: {}\n", config_file, problem);
@@ -65,32 +56,10 @@ int Main(const std::string& config_file, bool check_only) {
   HoldSignals();
   signal(SIGPIPE, SIG_IGN);
   const SystemClock clock;
-  std::mutex alarm_mutex;  // guards the two below
-  GuidanceProcess* process_for_alarms = nullptr;
-  std::vector<dds::Alarm> early_alarms;
-  dds::Participant participant(
-      participant_config,
-      [&](const dds::Alarm& alarm) {
-        const std::lock_guard lock(alarm_mutex);
-        if (process_for_alarms != nullptr) {
-          process_for_alarms->Report(alarm);
-        } else {
-          early_alarms.push_back(alarm);
-        }
-      },
-      [](dds::LogLevel level, std::string_view category, std::string_view text) {
-        fmt::print(stderr,
-                   "source=fastdds severity={} category={} text=\"{}\"\n",
-                   level == dds::LogLevel::kError ? "error" : "warning",
-                   category,
-                   text);
-      });
+  dds::AlarmRelay alarms;
+  dds::Participant participant(participant_config, alarms.Handler(), dds::LogDds);
   GuidanceProcess process(*config, *machine, participant, clock);
-  {
-    const std::lock_guard lock(alarm_mutex);
-    process_for_alarms = &process;
-    for (const dds::Alarm& alarm : early_alarms) process.Report(alarm);
-  }
+  alarms.SendTo([&process](const dds::Alarm& alarm) { process.Report(alarm); });
   fmt::print(stderr,
              "source=guidance code=started version={} machine_id={} domain={} axis_sha256={}\n",
              TBM_VERSION,
@@ -106,10 +75,7 @@ int Main(const std::string& config_file, bool check_only) {
   process.Run(stop.get_token(), [&manager] { manager.TellAlive(); });
   manager.TellStopping();
   ending.join();
-  {
-    const std::lock_guard lock(alarm_mutex);
-    process_for_alarms = nullptr;
-  }
+  alarms.SendTo({});
   fmt::print(stderr, "source=guidance code=ended\n");
   return static_cast<int>(ExitCode::kDone);
 }

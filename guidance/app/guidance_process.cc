@@ -12,6 +12,7 @@
 #include "guidance/app/journal.h"
 #include "guidance/app/journal_topic.h"
 #include "guidance/journal/local_record.h"
+#include "idl/cpp/dds_process.h"
 #include "idl/cpp/publisher.h"
 #include "idl/cpp/subscriber.h"
 
@@ -222,13 +223,7 @@ class GuidanceProcess::Impl {
 
   void Tell(const dds::Event& event) {
     events_.Write(event);
-    fmt::print(stderr,
-               "source={} code={} active={} severity={} text=\"{}\"\n",
-               event.source.view(),
-               event.code.view(),
-               event.active,
-               dds::SeverityCode(event.severity),
-               event.text.view());
+    dds::LogEvent(event);
   }
 
   // What the process has to say of itself, beside its steps: `tbm replay` does not meet it.

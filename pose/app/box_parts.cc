@@ -36,15 +36,6 @@ std::string HashOf(const std::string& text) {
   return hexadecimal;
 }
 
-dds::ParticipantConfig ParticipantConfigOf(const BoxConfig& config) {
-  dds::ParticipantConfig participant;
-  participant.domain_id = config.dds.domain;
-  participant.name = "camera_box " + config.machine_id;
-  participant.interfaces = config.dds.interfaces;
-  participant.peers = config.dds.initial_peers;
-  return participant;
-}
-
 BoxParts MakeParts(const BoxConfig& config,
                    const Rig& rig,
                    const std::string& rig_yaml,

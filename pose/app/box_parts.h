@@ -3,7 +3,6 @@
 #include <string>
 
 #include "devices/bus/sleeper.h"
-#include "idl/cpp/participant.h"
 #include "pose/app/box_config.h"
 #include "pose/app/camera_box.h"
 #include "pose/base/clock.h"
@@ -15,8 +14,6 @@ namespace tbm {
 
 // SHA-256 in hexadecimal: what `sha256sum rig.yaml` prints.
 std::string HashOf(const std::string& text);
-
-dds::ParticipantConfig ParticipantConfigOf(const BoxConfig& config);
 
 // The devices and the recorder that the configuration names. `rig_yaml` is the rig file's text, for
 // the recordings. Clock and sleeper outlive the parts.

@@ -1,6 +1,5 @@
 #include <cstdio>
 #include <fstream>
-#include <mutex>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -11,7 +10,7 @@
 #include <signal.h>
 
 #include "devices/bus/sleeper.h"
-#include "idl/cpp/participant.h"
+#include "idl/cpp/dds_process.h"
 #include "pose/app/box_config.h"
 #include "pose/app/box_parts.h"
 #include "pose/app/camera_box.h"
@@ -48,7 +47,8 @@ int Main(const std::string& config_file, Job job, double self_test_s) {
   const auto loaded = LoadRigFile(config->rig_file);
   if (!loaded) return PrintFaults(loaded.error());
   PrintFaults(loaded->warnings);
-  const dds::ParticipantConfig participant_config = ParticipantConfigOf(*config);
+  const dds::ParticipantConfig participant_config =
+      dds::ParticipantOf(config->dds, "camera_box " + config->machine_id);
   const auto problems = dds::Problems(participant_config);
   for (const std::string& problem : problems) {
     fmt::print(stderr, "{}: dds: {}\n", config_file, problem);
@@ -74,26 +74,8 @@ int Main(const std::string& config_file, Job job, double self_test_s) {
   if (job == Job::kSelfTest) {
     return RunSelfTest(*config, loaded->rig, self_test_s, clock, sleeper) ? kDone : kDevice;
   }
-  std::mutex alarm_mutex;  // guards the two below
-  CameraBox* box_for_alarms = nullptr;
-  std::vector<dds::Alarm> early_alarms;  // raised before there is a box, such as "no network"
-  dds::Participant participant(
-      participant_config,
-      [&](const dds::Alarm& alarm) {
-        const std::lock_guard lock(alarm_mutex);
-        if (box_for_alarms != nullptr) {
-          box_for_alarms->Report(alarm);
-        } else {
-          early_alarms.push_back(alarm);
-        }
-      },
-      [](dds::LogLevel level, std::string_view category, std::string_view text) {
-        fmt::print(stderr,
-                   "source=fastdds severity={} category={} text=\"{}\"\n",
-                   level == dds::LogLevel::kError ? "error" : "warning",
-                   category,
-                   text);
-      });
+  dds::AlarmRelay alarms;
+  dds::Participant participant(participant_config, alarms.Handler(), dds::LogDds);
   DdsSink dds_sink(participant);
   LogSink log_sink(dds_sink);
   QueuedSink sink(log_sink);
@@ -103,14 +85,7 @@ int Main(const std::string& config_file, Job job, double self_test_s) {
                 MakeParts(*config, loaded->rig, rig_yaml, clock, sleeper),
                 clock,
                 sink);
-  const auto send_alarms_to = [&](CameraBox* receiver) {
-    const std::lock_guard lock(alarm_mutex);
-    box_for_alarms = receiver;
-    if (receiver == nullptr) return;
-    for (const dds::Alarm& alarm : early_alarms) receiver->Report(alarm);
-    early_alarms.clear();
-  };
-  send_alarms_to(&box);
+  alarms.SendTo([&box](const dds::Alarm& alarm) { box.Report(alarm); });
 
   std::stop_source stop;
   std::jthread signals([&](const std::stop_token& done) {
@@ -127,7 +102,7 @@ int Main(const std::string& config_file, Job job, double self_test_s) {
   ServiceManager manager(clock);
   box.Run(stop.get_token(), [&manager] { manager.TellAlive(); });
   manager.TellStopping();
-  send_alarms_to(nullptr);
+  alarms.SendTo({});
   fmt::print(stderr, "source=camera_box code=ended\n");
   return kDone;
 }

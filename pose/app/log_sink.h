@@ -1,7 +1,6 @@
 #pragma once
 
-#include <fmt/format.h>
-
+#include "idl/cpp/dds_process.h"
 #include "pose/app/box_messages.h"
 
 namespace tbm {
@@ -16,14 +15,7 @@ class LogSink final : public MessageSink {
   void Publish(const dds::RelativePose& message) override { sink_.Publish(message); }
   void Publish(const dds::DeviceHealth& message) override { sink_.Publish(message); }
   void Publish(const dds::Event& event) override {
-    fmt::print(stderr,
-               "at_utc_ns={} severity={} source={} code={} active={} text=\"{}\"\n",
-               event.at.ns,
-               dds::SeverityCode(event.severity),
-               event.source.view(),
-               event.code.view(),
-               event.active,
-               event.text.view());
+    dds::LogEvent(event);
     sink_.Publish(event);
   }
 

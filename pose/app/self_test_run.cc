@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "idl/cpp/participant.h"
+#include "idl/cpp/dds_process.h"
 #include "idl/cpp/publisher.h"
 #include "idl/cpp/subscriber.h"
 #include "pose/app/box_parts.h"
@@ -40,10 +40,11 @@ std::vector<Finding> TryDds(const BoxConfig& config, const Clock& clock) {
   std::vector<std::string> complaints;
   bool has_come = false;
   {
-    dds::Participant participant(ParticipantConfigOf(config), [&](const dds::Alarm& alarm) {
-      const std::lock_guard lock(mutex);
-      if (alarm.active) complaints.push_back(alarm.text);
-    });
+    dds::Participant participant(dds::ParticipantOf(config.dds, "camera_box " + config.machine_id),
+                                 [&](const dds::Alarm& alarm) {
+                                   const std::lock_guard lock(mutex);
+                                   if (alarm.active) complaints.push_back(alarm.text);
+                                 });
     const dds::Subscriber<dds::Event> subscriber(
         participant, [&](const dds::Event& event, const dds::SampleFacts&) {
           const std::lock_guard lock(mutex);
