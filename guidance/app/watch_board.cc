@@ -199,7 +199,7 @@ void WatchBoard::AppendHealth(const WatchNow& now, std::vector<WatchRow>& rows) 
 void WatchBoard::AppendEvents(const WatchNow& now, std::vector<WatchRow>& rows) const {
   for (const auto& [key, alarm] : alarms_) {
     rows.push_back({"alarm " + std::string(dds::AlarmCode(alarm.kind)),
-                    alarm.text,
+                    alarm.topic.empty() ? alarm.text : alarm.topic + ": " + alarm.text,
                     "",
                     "",
                     "ALARM",
