@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "guidance/app/ask_command.h"
 #include "guidance/app/axis_options.h"
 #include "guidance/app/chain_command.h"
 #include "guidance/app/chain_input.h"
@@ -125,6 +126,20 @@ constexpr const char* kStudyHelp =
     "Example\n"
     "  tbm study published --out published_study";
 
+constexpr const char* kAskHelp =
+    "The process answers: accepted (it takes a while), done, refused or failed, with a sentence.\n"
+    "  guidance, total_station   acknowledge CODE\n"
+    "  total_station             check_references, set_up, pause, resume, propose_move "
+    "E,N,U,REFERENCE,\n"
+    "                            take_over_move, give_up_move, undo_move\n"
+    "\n"
+    "Examples\n"
+    "  tbm ask total_station check_references --by 'A. Surveyor'\n"
+    "  tbm ask guidance acknowledge deviation_high --by 'O. Perator' --because 'shift engineer "
+    "knows'\n"
+    "\n"
+    "Exit codes: 0 done, 2 refused, 3 failed, 4 nobody answers.";
+
 constexpr const char* kWatchHelp =
     "On a terminal: a screen that redraws itself, green ok, yellow degraded, red none. What is old "
     "stands\n"
@@ -144,6 +159,7 @@ struct Requests {
   CheckRequest check;
   StudyRequest study;
   WatchRequest watch;
+  AskRequest ask;
   AxisRequests axis;
   JournalRequests journal;
   std::string align = "none";
@@ -260,6 +276,28 @@ CLI::App* AddWatch(CLI::App& app, Requests& requests) {
   return watch;
 }
 
+CLI::App* AddAsk(CLI::App& app, Requests& requests) {
+  AskRequest& request = requests.ask;
+  CLI::App* ask = app.add_subcommand("ask", "Asks a process of the machine to do something");
+  ask->footer(kAskHelp);
+  ask->add_option("ADDRESSEE", request.addressee, "total_station or guidance")->required();
+  ask->add_option("VERB", request.verb, "what to do")->required();
+  ask->add_option("ARGUMENT", request.argument, "as the verb wants it");
+  ask->add_option("--by", request.by, "your name; it stands in the journal")->required();
+  ask->add_option("--because", request.because, "your reason");
+  ask->add_option("--machine", request.machine, "machine_id; none: the one that is heard");
+  ask->add_option("--wait", request.wait_s, "seconds, for the last answer")
+      ->check(CLI::Range(0.0, 86400.0))
+      ->capture_default_str();
+  ask->add_option("--domain", request.domain_id, "DDS domain")
+      ->check(CLI::Range(0, 232))
+      ->capture_default_str();
+  ask->add_option(
+      "--interface", request.interfaces, "address or name of a network interface; 127.0.0.1");
+  ask->add_option("--peer", request.peers, "address of a machine to look for; none: by multicast");
+  return ask;
+}
+
 CLI::App* AddCompletion(CLI::App& app, Requests& requests) {
   CLI::App* completion = app.add_subcommand("completion", "Completion script for a shell");
   completion->footer("Example, in ~/.bashrc:\n  source <(tbm completion bash)");
@@ -282,6 +320,7 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   const CLI::App* axis = AddAxis(app, requests.axis);
   const CLI::App* study = AddStudy(app, requests);
   const CLI::App* watch = AddWatch(app, requests);
+  const CLI::App* ask = AddAsk(app, requests);
   const CLI::App* record = AddRecord(app, requests.journal);
   const CLI::App* exported = AddExport(app, requests.journal);
   const CLI::App* replay = AddReplay(app, requests.journal);
@@ -309,6 +348,7 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   if (axis->parsed()) return RunAxis(*axis, requests.axis, console);
   if (study->parsed()) return RunStudy(requests.study, console);
   if (watch->parsed()) return RunWatch(requests.watch, console);
+  if (ask->parsed()) return RunAsk(requests.ask, console);
   if (record->parsed()) return RunRecord(requests.journal.record, console);
   if (exported->parsed()) return RunExport(requests.journal.exported, console);
   if (replay->parsed()) return RunReplay(requests.journal.replay, console);

@@ -10,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "guidance/app/ask_command.h"
 #include "guidance/app/replay_command.h"
 #include "idl/cpp/publisher.h"
 #include "idl/cpp/subscriber.h"
@@ -79,20 +80,12 @@ class Listener {
     const std::lock_guard lock(mutex_);
     return alarms_;
   }
-  std::optional<dds::CommandReply> reply() {
-    const std::lock_guard lock(mutex_);
-    return reply_;
-  }
-  void Ask(const dds::Command& command) { commands_.Write(command); }
-  bool HearsCommands() { return commands_.matched_readers() > 0; }
 
  private:
   std::mutex mutex_;
   dds::Guidance guidance_;
   std::vector<dds::AlarmStatus> alarms_;
-  std::optional<dds::CommandReply> reply_;
   dds::Participant participant_{OnLoopback(kDomain, "listener")};
-  dds::Publisher<dds::Command> commands_{participant_};
   dds::Subscriber<dds::Guidance> guidances_{
       participant_, [this](const dds::Guidance& m, const dds::SampleFacts&) {
         const std::lock_guard lock(mutex_);
@@ -103,11 +96,6 @@ class Listener {
         const std::lock_guard lock(mutex_);
         std::erase_if(alarms_, [&](const auto& known) { return known.code == m.code; });
         alarms_.push_back(m);
-      }};
-  dds::Subscriber<dds::CommandReply> replies_{
-      participant_, [this](const dds::CommandReply& m, const dds::SampleFacts&) {
-        const std::lock_guard lock(mutex_);
-        reply_ = m;
       }};
 };
 
@@ -138,19 +126,21 @@ TEST(GuidanceProcess, GuidesFromItsNeighboursTopicsAndItsJournalReplaysBitForBit
     ASSERT_TRUE(
         Eventually([&] { return phase_of("position_lost") == dds::AlarmPhase::kUnacknowledged; }));
 
-    dds::Command command;
-    command.machine_id = std::string_view(machine.machine.machine_id);
-    command.request_id = "answer-1";
-    command.addressee = "guidance";
-    command.verb = "acknowledge";
-    command.argument = "position_lost";
-    command.by = "O. Perator";
-    command.issued_at = clock.Now();
-    command.expires_at = clock.Now() + 30s;
-    ASSERT_TRUE(Eventually([&] { return listener.HearsCommands(); }));
-    listener.Ask(command);
-    ASSERT_TRUE(Eventually([&] { return listener.reply().has_value(); }));
-    EXPECT_EQ(listener.reply()->outcome, dds::CommandOutcome::kDone);
+    AskRequest ask;
+    ask.addressee = "guidance";
+    ask.verb = "acknowledge";
+    ask.argument = "position_lost";
+    ask.by = "O. Perator";
+    ask.domain_id = kDomain;
+    std::ostringstream answer;
+    EXPECT_EQ(RunAsk(ask, {answer, answer}), ExitCode::kDone) << answer.str();
+    EXPECT_EQ(answer.str(), "guidance: done: acknowledged\n");
+    EXPECT_EQ(RunAsk(ask, {answer, answer}), ExitCode::kBadInput);  // once is enough
+    EXPECT_THAT(answer.str(), testing::HasSubstr("guidance: refused: there is nothing"));
+    ask.addressee = "nobody";
+    ask.wait_s = 0.5;
+    EXPECT_EQ(RunAsk(ask, {answer, answer}), ExitCode::kDds);
+    EXPECT_THAT(answer.str(), testing::HasSubstr("nobody does not answer: does it run"));
     EXPECT_TRUE(
         Eventually([&] { return phase_of("position_lost") == dds::AlarmPhase::kAcknowledged; }));
 
