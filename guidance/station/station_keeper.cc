@@ -295,7 +295,9 @@ Judged StationKeeper::Take(const Pointed& pointed) {
     judged.reason = "no_set_up";
   } else if (is_moving_) {
     judged.reason = "station_moving";
-  } else if (health() != SetUpHealth::kGood || round_ == Round::kSetUp) {
+  } else if (round_ == Round::kSetUp) {
+    judged.reason = "setting_up";
+  } else if (health() != SetUpHealth::kGood) {
     judged.reason = "set_up_suspect";
   } else if (!pointed.raw.slope_m) {
     judged.reason = "angles_only";

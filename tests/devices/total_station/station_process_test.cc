@@ -3,6 +3,9 @@
 
 #include "devices/app/station_process.h"
 
+#include <atomic>
+#include <thread>
+
 #include "devices/app/station_state_file.h"
 #include "tests/devices/total_station/station_bench.h"
 
@@ -226,6 +229,58 @@ TEST_F(StationRuns, CommandsAreRefusedWithTheReason) {
   process_->Hear(late);
   Run(2s);
   EXPECT_EQ(sink_.replies.size(), replies);
+}
+
+// Its threads, on the real clock: one measures, one beats, others speak to it.
+TEST_F(StationRuns, WorksBeatsAndListensAtOnce) {
+  class Counting final : public StationSink {
+   public:
+    void Publish(const dds::StationObservation& m) override {
+      good += m.status == dds::ObservationStatus::kGood && m.kind == dds::ObservedKind::kPrism;
+    }
+    void Publish(const dds::StationSetUp&) override {}
+    void Publish(const dds::DeviceHealth&) override { ++beats; }
+    void Publish(const dds::Event&) override { ++events; }
+    void Publish(const dds::AlarmStatus&) override {}
+    void Publish(const dds::CommandReply&) override { ++replies; }
+    std::atomic<int> good = 0, beats = 0, events = 0, replies = 0;
+  } sink;
+  const SystemClock clock;
+  SystemSleeper sleeper;
+  GeocomEmulatorOptions options;
+  options.think_time = options.distance_time = options.recognition_time = 1ms;
+  options.turn_rad_per_s = 1e4;
+  GeocomEmulator emulator(options, instrument_, clock);
+  GeocomTotalStation station(config_.instrument,
+                             std::make_unique<EmulatorLink>(emulator, clock, sleeper),
+                             1,
+                             clock,
+                             sleeper);
+  config_.keeper.cycle_period = 0s;
+  StationProcess process(config_, machine_, station, clock, sleeper, sink);
+  std::stop_source stop;
+  std::atomic<int> alive = 0;
+  std::jthread running([&] { process.Run(stop.get_token(), [&] { ++alive; }); });
+  const auto until = clock.Steady() + 60s;
+  for (int i = 0; clock.Steady() < until; ++i) {
+    if (sink.good > 5 && sink.beats > 1 && sink.replies > 3 && alive > 1) break;
+    dds::Command command;
+    command.machine_id = "TBM-1";
+    command.request_id = std::string_view(std::to_string(i));
+    command.addressee = "total_station";
+    command.verb = "acknowledge";
+    command.argument = "low_power";
+    command.expires_at = clock.Now() + 10s;
+    process.Hear(command);
+    process.Report({dds::AlarmKind::kSilent, true, "topic", "text"});
+    std::this_thread::sleep_for(20ms);
+  }
+  EXPECT_GT(sink.good, 5);
+  EXPECT_GT(sink.replies, 3);
+  EXPECT_GT(sink.beats, 1);
+  EXPECT_GT(sink.events, 3);
+  EXPECT_GT(alive, 1);
+  stop.request_stop();
 }
 
 class StationMoves : public StationRuns {
