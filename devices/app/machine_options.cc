@@ -40,7 +40,9 @@ void AddMachineOptions(CLI::App& app, MachineOptions& o) {
   app.add_option("--speed", o.speed, "world seconds per second")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1000.0));
-  app.add_option("--distance", o.motion.start_distance_m, "camera to target at the start [m]")
+  app.add_option("--distance",
+                 o.motion.start_distance_m,
+                 "camera to target at the start [m]; with --machine it follows from there")
       ->capture_default_str()
       ->check(CLI::Range(0.5, 20.0));
   app.add_option("--advance", o.advance_mm_per_min, "of the front shield [mm/min]")

@@ -41,6 +41,7 @@ struct StationInTunnel {
 };
 
 void AddStation(CLI::App& app, StationInTunnel& o) {
+  app.option_defaults()->group("Total station");
   app.add_option("--station-port",
                  o.port,
                  "TCP port of a total station that sees the prisms of --machine; 0: the system "
