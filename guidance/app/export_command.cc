@@ -108,7 +108,12 @@ class Exporting {
   ExitCode Run() {
     if (!ReadLimits() || !FindTopics() || !FindFiles()) return ExitCode::kBadInput;
     if (const auto fault = MakeFolder(request_.out)) return Refuse(*fault);
-    for (Source& source : sources_) ReadOnce(source);
+    Progress progress(console_, "tbm export", 2 * sources_.size());
+    std::size_t done = 0;
+    for (Source& source : sources_) {
+      ReadOnce(source);
+      progress.Show(++done);
+    }
     ReportRefused();
     if (tables_.empty()) return Refuse("nothing to export: none of the messages asked for");
     for (auto& [topic, table] : tables_) {
@@ -122,6 +127,7 @@ class Exporting {
     is_writing_ = true;
     for (const Source& source : sources_) {
       if (const auto fault = WriteOnce(source)) return Refuse(*fault);
+      progress.Show(++done);
     }
     for (auto& [topic, table] : tables_) {
       if (const auto fault = Flush(table)) return Refuse(*fault);

@@ -6,7 +6,6 @@
 #include <random>
 #include <sstream>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
@@ -22,10 +21,8 @@
 #include "guidance/app/repair_command.h"
 #include "guidance/journal/mcap_repair.h"
 #include "guidance/journal/mcap_writer.h"
-#include "idl/cpp/publisher.h"
 #include "tests/idl/guidance_samples.h"
 #include "tests/idl/samples.h"
-#include "tests/support/process.h"
 #include "tests/support/random.h"
 #include "tests/support/temp_folder.h"
 
@@ -250,8 +247,6 @@ TEST(Repair, RefusesInWords) {
   EXPECT_THAT(other.err, HasSubstr("other.mcap: is no journal"));
   EXPECT_FALSE(fs::exists(folder / "x.mcap"));
 }
-
-// ---- export ----
 
 Outcome Export(ExportRequest request) { return Run<ExportRequest>(&RunExport, request); }
 
@@ -539,84 +534,6 @@ TEST(JournalTimes, TextsAreReadAndWritten) {
                                  "1.5"}) {
     EXPECT_FALSE(UtcFromText(text)) << text;
   }
-}
-
-// ---- record: the program itself, and a machine that talks to it ----
-
-constexpr int kDomain = 174;
-
-TEST(Record, EverySampleOfEveryTopicReachesTheJournal) {
-  const TempFolder folder;
-  dds::ParticipantConfig config;
-  config.domain_id = kDomain;
-  dds::Participant participant(config);
-  dds::Publisher<dds::RelativePose> poses(participant);
-  dds::Publisher<dds::Guidance> guidance(participant);
-  dds::Publisher<dds::Command> commands(participant);
-  dds::Publisher<dds::AlarmStatus> alarms(participant);
-  ASSERT_EQ(alarms.Write(dds::test::FullAlarmStatus()), dds::WriteOutcome::kWritten);
-
-  test::Process record(
-      {TBM_PROGRAM, "record", "--out", folder / "journal", "--domain", std::to_string(kDomain)});
-  const auto patience = std::chrono::steady_clock::now() + 30s;
-  while (poses.matched_readers() < 1 || guidance.matched_readers() < 1 ||
-         commands.matched_readers() < 1 || alarms.matched_readers() < 1) {
-    ASSERT_LT(std::chrono::steady_clock::now(), patience) << "tbm record does not listen";
-    std::this_thread::sleep_for(10ms);
-  }
-  constexpr std::uint64_t kCount = 40;
-  for (std::uint64_t i = 1; i <= kCount; ++i) {
-    dds::RelativePose pose = dds::test::FullRelativePose();
-    pose.sample_number = i;
-    ASSERT_EQ(poses.Write(pose), dds::WriteOutcome::kWritten);
-    dds::Guidance message = dds::test::FullGuidance();
-    message.sample_number = i;
-    ASSERT_EQ(guidance.Write(message), dds::WriteOutcome::kWritten);
-    dds::Command command = dds::test::FullCommand();
-    command.request_id = std::string_view(std::to_string(i));
-    ASSERT_EQ(commands.Write(command), dds::WriteOutcome::kWritten);
-    std::this_thread::sleep_for(10ms);
-  }
-  // What was sent last is on its way.
-  std::this_thread::sleep_for(500ms);
-  record.Signal(SIGINT);
-  EXPECT_EQ(record.Wait(), 0);
-  EXPECT_TRUE(record.HasLine("tbm/v1/guidance "));
-  const auto files = JournalFilesIn(folder / "journal");
-  ASSERT_EQ(files.size(), 1u);
-  const std::string bytes = ReadText(files[0].path);
-  std::map<std::string, std::uint64_t> seen;
-  const auto content = ReadMcap(View(bytes), [&](const McapChannel& channel, const McapMessage& m) {
-    ++seen[channel.topic];
-    if (channel.topic == "tbm/v1/relative_pose") {
-      dds::RelativePose pose;
-      ASSERT_EQ(dds::DecodeCdr(m.data, &pose), dds::BoundaryFault::kNone);
-      EXPECT_EQ(pose.sample_number, seen[channel.topic]);
-      EXPECT_EQ(m.publish_time, pose.published_at);
-      pose.sample_number = dds::test::FullRelativePose().sample_number;
-      EXPECT_TRUE(dds::test::Same(pose, dds::test::FullRelativePose()));
-    }
-  });
-  ASSERT_TRUE(content);
-  EXPECT_TRUE(content->has_footer);
-  EXPECT_EQ(seen["tbm/v1/relative_pose"], kCount);
-  EXPECT_EQ(seen["tbm/v1/guidance"], kCount);
-  EXPECT_EQ(seen["tbm/v1/command"], kCount);
-  EXPECT_EQ(seen["tbm/v1/alarm"], 1u) << "what stood before we came";
-}
-
-TEST(Record, SaysThatNothingWasHeard) {
-  const TempFolder folder;
-  test::Process record({TBM_PROGRAM,
-                        "record",
-                        "--out",
-                        folder / "journal",
-                        "--domain",
-                        std::to_string(kDomain + 1),
-                        "--seconds",
-                        "0.5"});
-  EXPECT_EQ(record.Wait(), static_cast<int>(ExitCode::kDds));
-  EXPECT_TRUE(record.HasLine("tbm: nothing heard on domain 175"));
 }
 
 }  // namespace
