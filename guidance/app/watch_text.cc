@@ -99,8 +99,12 @@ std::string_view ColourOf(WatchStyle style) {
   return "";
 }
 
+std::string Padded(const std::string& text, std::size_t width) {
+  return text.size() > width ? text : text + std::string(width - text.size(), ' ');
+}
+
 std::string Cut(const std::string& text, std::size_t width) {
-  return text.size() > width ? text.substr(0, width) : text + std::string(width - text.size(), ' ');
+  return Padded(text.substr(0, width), width);
 }
 
 }  // namespace
@@ -109,6 +113,8 @@ std::string Cut(const std::string& text, std::size_t width) {
 // word that says what they are worth.
 std::string WatchScreen(const std::vector<WatchRow>& rows, int width_chars, bool with_colours) {
   constexpr std::size_t kLongestStatus = 34;
+  constexpr std::size_t kValueColumn =
+      62;  // a sentence may be longer; a number's sigma stands near
   const auto width = static_cast<std::size_t>(std::max(width_chars, 20));
   std::size_t what_width = 0;
   std::size_t status_width = 0;
@@ -116,7 +122,7 @@ std::string WatchScreen(const std::vector<WatchRow>& rows, int width_chars, bool
   for (const WatchRow& row : rows) {
     what_width = std::max(what_width, row.what.size());
     status_width = std::max(status_width, std::min(row.status.size(), kLongestStatus));
-    value_width = std::max(value_width, row.value.size());
+    value_width = std::max(value_width, std::min(row.value.size(), kValueColumn));
   }
   std::string screen;
   for (const WatchRow& row : rows) {
@@ -124,7 +130,7 @@ std::string WatchScreen(const std::vector<WatchRow>& rows, int width_chars, bool
                                                          Cut(row.what, what_width),
                                                          Cut(row.status, status_width),
                                                          row.age,
-                                                         Cut(row.value, value_width),
+                                                         Padded(row.value, value_width),
                                                          row.sigma));
     const std::string_view colour = with_colours ? ColourOf(row.style) : "";
     screen += colour;

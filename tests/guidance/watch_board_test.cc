@@ -252,6 +252,21 @@ TEST(WatchBoard, ShowsWhatTheOperatorSteersBy) {
   EXPECT_EQ(RowOf(board, now, "   source station").status, "fresh 12 s");
 }
 
+TEST(WatchBoard, SigmasStandBesideTheirNumbersHoweverLongASentenceIs) {
+  WatchBoard board;
+  board.Add(Steering(), kSteady);
+  dds::Event event;
+  event.machine_id = "tbm7";
+  event.source = "box";
+  event.code = "x";
+  event.at = kUtc;
+  event.text = std::string(150, 'a');
+  board.Add(event, kSteady);
+  const std::string screen = WatchScreen(board.Rows(NowAfter({})), 132, false);
+  const std::size_t line = screen.find("> cutter_face");
+  EXPECT_THAT(screen.substr(line, screen.find('\n', line) - line), HasSubstr("2.1 8.9"));
+}
+
 TEST(WatchBoard, ACoastingSourceSaysForHowLongAndHowWell) {
   WatchBoard board;
   dds::Guidance guidance = Steering();
