@@ -56,17 +56,13 @@ JournalReplay::~JournalReplay() = default;
 void JournalReplay::Take(const McapChannel& channel, const McapMessage& message) {
   const std::string_view topic = channel.topic;
   if (topic == kFileTopic) return TakeFile(message.data);
-  if (topic == kStepTopic) return TakeStep(message.data);
-  const bool is_input = IsInput(topic);
-  if (is_input) {
-    // Sequence numbers run on from file to file; a channel's first one may be any.
-    const auto [known, is_first] = last_sequence_.try_emplace(message.channel, message.sequence);
-    if (!is_first) {
-      const std::uint32_t step = message.sequence - known->second;
-      if (step > 1 && run_) report_.lost += step - 1;
-      known->second = message.sequence;
-    }
+  if (topic == dds::kAlarmStatusTopic.name) {
+    if (run_) CompareAlarm(message);  // several processes write this topic
+    return;
   }
+  const bool is_input = IsInput(topic);
+  if (!IsNew(channel.topic, message.sequence, is_input)) return;
+  if (topic == kStepTopic) return TakeStep(message.data);
   if (!run_) {
     if (is_input) ++report_.skipped;
     return;
@@ -80,7 +76,17 @@ void JournalReplay::Take(const McapChannel& channel, const McapMessage& message)
   if (topic == dds::kCommandTopic.name) return TakeInput<dds::Command>(message.data);
   if (topic == dds::kGuidanceTopic.name) return CompareGuidance(message.data);
   if (topic == dds::kShieldPoseTopic.name) return CompareShield(message.data);
-  if (topic == dds::kAlarmStatusTopic.name) return CompareAlarm(message.data);
+}
+
+// Sequence numbers run from 1 and on from file to file. A gap is what the journal did not keep; one
+// that stands twice was written again after the disk had failed.
+bool JournalReplay::IsNew(const std::string& stream, std::uint32_t sequence, bool counts_gaps) {
+  const auto [known, is_first] = last_sequence_.try_emplace(stream, sequence);
+  if (is_first) return true;
+  if (sequence <= known->second) return false;
+  if (counts_gaps && run_) report_.lost += sequence - known->second - 1;
+  known->second = sequence;
+  return true;
 }
 
 void JournalReplay::TakeFile(BytesView data) {
@@ -195,13 +201,14 @@ void JournalReplay::CompareShield(BytesView data) {
           std::optional(is_rear ? run_->output->rear : run_->output->front));
 }
 
-void JournalReplay::CompareAlarm(BytesView data) {
-  const auto said = Decoded<dds::AlarmStatus>(data);
+void JournalReplay::CompareAlarm(const McapMessage& message) {
+  const auto said = Decoded<dds::AlarmStatus>(message.data);
   if (!said) {
     ++report_.unreadable;
     return;
   }
   if (said->source.view() != kGuidanceSource || run_->output == nullptr) return;
+  if (!IsNew("alarms of guidance", message.sequence, false)) return;
   const auto& alarms = run_->output->alarms;
   std::optional<dds::AlarmStatus> now;
   if (run_->alarms_seen < alarms.size()) now = alarms[run_->alarms_seen++];

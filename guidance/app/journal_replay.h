@@ -52,6 +52,7 @@ class JournalReplay {
  private:
   struct Run;
 
+  bool IsNew(const std::string& stream, std::uint32_t sequence, bool counts_gaps);
   void TakeFile(BytesView data);
   void TakeStep(BytesView data);
   template <class Message>
@@ -60,13 +61,13 @@ class JournalReplay {
   void Compare(std::string_view topic, const Message& said, std::optional<Message> now);
   void CompareGuidance(BytesView data);
   void CompareShield(BytesView data);
-  void CompareAlarm(BytesView data);
+  void CompareAlarm(const McapMessage& message);
   void Note(std::string_view topic, std::string what);
 
   std::optional<ReadFile> other_machine_;
   std::map<std::string, ReadFile> files_;
   std::unique_ptr<Run> run_;
-  std::map<std::uint16_t, std::uint32_t> last_sequence_;
+  std::map<std::string, std::uint32_t> last_sequence_;  // of each stream that counts
   Report report_;
 };
 

@@ -328,6 +328,19 @@ TEST_F(JournalOfAShift, WithoutItsBeginningItSaysSo) {
   EXPECT_GT(replay.report().skipped, 100u);
 }
 
+// After a disk error a chunk may stand in two files.
+TEST_F(JournalOfAShift, WhatStandsTwiceIsTakenOnce) {
+  DriveOn(2);
+  const std::size_t from = bytes_.size();
+  DriveOn(1);
+  const Bytes again(bytes_.begin() + static_cast<std::ptrdiff_t>(from), bytes_.end());
+  Write(again);
+  DriveOn(2);
+  const std::string text = Replay(ExitCode::kDone);
+  EXPECT_THAT(text, HasSubstr("10 steps taken again"));
+  EXPECT_THAT(text, HasSubstr("bit for bit"));
+}
+
 TEST_F(JournalOfAShift, InputsThatAreMissingAreCounted) {
   DriveOn(4);
   Finish();
