@@ -63,7 +63,7 @@ StationProcess::StationProcess(const StationConfig& config,
 void StationProcess::Restore() {
   auto loaded = LoadKeptStation(config_.state_file);
   if (loaded) {
-    if (*loaded) keeper_.Restore(std::move(**loaded));
+    if (*loaded) keeper_.Restore(**loaded);
     saved_revision_ = keeper_.revision();
     return;
   }

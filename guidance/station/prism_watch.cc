@@ -16,6 +16,7 @@ constexpr double kDistanceFloor_m = 1e-3;
 
 std::vector<int> NamesOf(const std::vector<SightedPrism>& all) {
   std::vector<int> names;
+  names.reserve(all.size());
   for (const SightedPrism& one : all) names.push_back(one.prism);
   return names;
 }
