@@ -260,7 +260,8 @@ TEST(WatchBoard, SigmasStandBesideTheirNumbersHoweverLongASentenceIs) {
   event.source = "box";
   event.code = "x";
   event.at = kUtc;
-  event.text = std::string(150, 'a');
+  const std::string sentence(150, 'a');
+  event.text = std::string_view(sentence);
   board.Add(event, kSteady);
   const std::string screen = WatchScreen(board.Rows(NowAfter({})), 132, false);
   const std::size_t line = screen.find("> cutter_face");
