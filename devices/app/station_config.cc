@@ -315,16 +315,7 @@ class Reader {
 
 Result<StationConfig, RigFileFaults> ParseStationConfig(std::string_view yaml,
                                                         const std::string& file) {
-  RigFileFaults faults;
-  StationConfig config;
-  try {
-    const YAML::Node root = YAML::Load(std::string(yaml));
-    config = Reader(file).Read(YamlNode(root, "", file, &faults));
-  } catch (const YAML::Exception& error) {
-    faults.push_back({file, error.mark.line + 1, "", "not YAML: " + error.msg});
-  }
-  if (!faults.empty()) return Failure{std::move(faults)};
-  return config;
+  return ReadYaml(yaml, file, [&](const YamlNode& root) { return Reader(file).Read(root); });
 }
 
 Result<StationConfig, RigFileFaults> LoadStationConfig(const std::string& path) {

@@ -1,6 +1,5 @@
 #include <cstdio>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -13,7 +12,7 @@
 #include "devices/app/station_process.h"
 #include "devices/total_station/make_total_station.h"
 #include "guidance/config/machine_file.h"
-#include "idl/cpp/participant.h"
+#include "idl/cpp/dds_process.h"
 #include "idl/cpp/publisher.h"
 #include "idl/cpp/subscriber.h"
 #include "pose/app/service_manager.h"
@@ -42,14 +41,7 @@ class DdsStationSink final : public StationSink {
   void Publish(const dds::AlarmStatus& message) override { alarms_.Write(message); }
   void Publish(const dds::CommandReply& message) override { replies_.Write(message); }
   void Publish(const dds::Event& event) override {
-    fmt::print(stderr,
-               "at_utc_ns={} severity={} source={} code={} active={} text=\"{}\"\n",
-               event.at.ns,
-               dds::SeverityCode(event.severity),
-               event.source.view(),
-               event.code.view(),
-               event.active,
-               event.text.view());
+    dds::LogEvent(event);
     events_.Write(event);
   }
 
@@ -62,43 +54,9 @@ class DdsStationSink final : public StationSink {
   dds::Publisher<dds::CommandReply> replies_;
 };
 
-// Alarms of the DDS side go to the process as soon as there is one; until then they wait.
-class AlarmPost {
- public:
-  void Take(const dds::Alarm& alarm) {
-    const std::lock_guard lock(mutex_);
-    if (process_ != nullptr) {
-      process_->Report(alarm);
-    } else {
-      waiting_.push_back(alarm);
-    }
-  }
-  void DeliverTo(StationProcess* process) {
-    const std::lock_guard lock(mutex_);
-    process_ = process;
-    if (process == nullptr) return;
-    for (const dds::Alarm& alarm : waiting_) process->Report(alarm);
-    waiting_.clear();
-  }
-
- private:
-  std::mutex mutex_;  // guards all below
-  StationProcess* process_ = nullptr;
-  std::vector<dds::Alarm> waiting_;
-};
-
 int PrintFaults(const RigFileFaults& faults) {
   for (const RigFileFault& fault : faults) fmt::print(stderr, "{}\n", fault.Text());
   return kConfiguration;
-}
-
-dds::ParticipantConfig ParticipantOf(const DdsNetwork& network, const std::string& machine_id) {
-  dds::ParticipantConfig config;
-  config.domain_id = network.domain;
-  config.name = "total_station " + machine_id;
-  config.interfaces = network.interfaces;
-  config.peers = network.initial_peers;
-  return config;
 }
 
 int Run(const StationConfig& config,
@@ -108,22 +66,13 @@ int Run(const StationConfig& config,
   signal(SIGPIPE, SIG_IGN);
   const SystemClock clock;
   SystemSleeper sleeper;
-  AlarmPost post;
-  dds::Participant participant(
-      participant_config,
-      [&post](const dds::Alarm& alarm) { post.Take(alarm); },
-      [](dds::LogLevel level, std::string_view category, std::string_view text) {
-        fmt::print(stderr,
-                   "source=fastdds severity={} category={} text=\"{}\"\n",
-                   level == dds::LogLevel::kError ? "error" : "warning",
-                   category,
-                   text);
-      });
+  dds::AlarmRelay alarms;
+  dds::Participant participant(participant_config, alarms.Handler(), dds::LogDds);
   DdsStationSink sink(participant);
   const std::unique_ptr<TotalStation> instrument =
       MakeTotalStation(config.instrument, clock, sleeper);
   StationProcess process(config, machine, *instrument, clock, sleeper, sink);
-  post.DeliverTo(&process);
+  alarms.SendTo([&process](const dds::Alarm& alarm) { process.Report(alarm); });
   std::stop_source stop;
   {
     const dds::Subscriber<dds::ShieldPose> poses(
@@ -146,7 +95,7 @@ int Run(const StationConfig& config,
     process.Run(stop.get_token(), [&manager] { manager.TellAlive(); });
     manager.TellStopping();
   }
-  post.DeliverTo(nullptr);
+  alarms.SendTo({});
   fmt::print(stderr, "source=total_station code=ended\n");
   return kDone;
 }
@@ -156,7 +105,8 @@ int Main(const std::string& config_file, bool check_only) {
   if (!config) return PrintFaults(config.error());
   const auto machine = LoadMachineFile(config->machine_file);
   if (!machine) return PrintFaults(machine.error());
-  const auto participant_config = ParticipantOf(config->dds, machine->machine.machine_id);
+  const auto participant_config =
+      dds::ParticipantOf(config->dds, "total_station " + machine->machine.machine_id);
   const auto problems = dds::Problems(participant_config);
   for (const std::string& problem : problems) {
     fmt::print(stderr, "{}: dds: {}\n", config_file, problem);

@@ -65,15 +65,7 @@ std::optional<ReadFile> ReadAll(const std::string& path,
 
 Result<GuidanceConfig, RigFileFaults> ParseGuidanceConfig(std::string_view yaml,
                                                           const std::string& file) {
-  RigFileFaults faults;
-  GuidanceConfig config;
-  try {
-    config = Read(YamlNode(YAML::Load(std::string(yaml)), "", file, &faults), file);
-  } catch (const YAML::Exception& error) {
-    return Failure{RigFileFaults{{file, error.mark.line + 1, "", "is not YAML: " + error.msg}}};
-  }
-  if (!faults.empty()) return Failure{faults};
-  return config;
+  return ReadYaml(yaml, file, [&](const YamlNode& root) { return Read(root, file); });
 }
 
 Result<GuidanceConfig, RigFileFaults> LoadGuidanceConfig(const std::string& path) {

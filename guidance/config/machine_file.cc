@@ -355,17 +355,11 @@ class MachineReader {
 
 Result<MachineFile, RigFileFaults> ParseMachineFile(std::string_view yaml,
                                                     const std::string& file) {
-  RigFileFaults faults;
-  MachineFile read;
-  try {
-    const YAML::Node root = YAML::Load(std::string(yaml));
-    read = MachineReader(file).Read(YamlNode(root, "", file, &faults));
-  } catch (const YAML::Exception& error) {
-    faults.push_back({file, error.mark.line + 1, "", "not YAML: " + error.msg});
-  }
-  if (!faults.empty()) return Failure{std::move(faults)};
-  read.sha256 = Sha256(yaml);
-  return read;
+  return ReadYaml(yaml, file, [&](const YamlNode& root) {
+    MachineFile read = MachineReader(file).Read(root);
+    read.sha256 = Sha256(yaml);
+    return read;
+  });
 }
 
 Result<MachineFile, RigFileFaults> LoadMachineFile(const std::string& path) {

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include "pose/base/angle.h"
-#include "pose/rig/rig_yaml.h"
 #include "pose/rig/dds_section.h"
+#include "pose/rig/rig_yaml.h"
 #include "pose/rig/yaml_section.h"
 
 namespace tbm {
@@ -215,16 +215,7 @@ class Reader {
 }  // namespace
 
 Result<BoxConfig, RigFileFaults> ParseBoxConfig(std::string_view yaml, const std::string& file) {
-  RigFileFaults faults;
-  BoxConfig config;
-  try {
-    const YAML::Node root = YAML::Load(std::string(yaml));
-    config = Reader(file).Read(YamlNode(root, "", file, &faults));
-  } catch (const YAML::Exception& error) {
-    faults.push_back({file, error.mark.line + 1, "", "not YAML: " + error.msg});
-  }
-  if (!faults.empty()) return Failure{std::move(faults)};
-  return config;
+  return ReadYaml(yaml, file, [&](const YamlNode& root) { return Reader(file).Read(root); });
 }
 
 Result<BoxConfig, RigFileFaults> LoadBoxConfig(const std::string& path) {

@@ -5,6 +5,8 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "pose/rig/rig_yaml.h"
@@ -20,6 +22,23 @@ std::string BesideFile(const std::string& file, const std::string& path);
 
 // A file's whole text when it can be read and is not larger than 1 MB; `what` is "camera_box.yaml".
 Result<std::string, RigFileFaults> ReadConfigText(const std::string& path, std::string_view what);
+
+// What `read` makes of the text's root, or every fault that it found on the way. Text that is no
+// YAML is a fault too.
+template <class Read, class Config = std::invoke_result_t<Read, const YamlNode&>>
+Result<Config, RigFileFaults> ReadYaml(std::string_view yaml,
+                                       const std::string& file,
+                                       const Read& read) {
+  RigFileFaults faults;
+  Config config;
+  try {
+    config = read(YamlNode(YAML::Load(std::string(yaml)), "", file, &faults));
+  } catch (const YAML::Exception& error) {
+    faults.push_back({file, error.mark.line + 1, "", "not YAML: " + error.msg});
+  }
+  if (!faults.empty()) return Failure{std::move(faults)};
+  return config;
+}
 
 // Reads members of one map into fields that hold their defaults, and remembers which names it
 // knows, so that the rest can be refused. An absent member leaves its field untouched to the bit.

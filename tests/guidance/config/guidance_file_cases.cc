@@ -64,7 +64,7 @@ TEST(GuidanceFile, EachFaultNamesFileLineAndKey) {
       {"machine: m.yaml\ndds: {interfaces: []}\n", "name at least one address"},
       {"machine: m.yaml\ndds: {interfaces: [eth0]}\n", "'eth0' is not an IPv4 address"},
       {"- machine\n", "is not a map"},
-      {"machine: [\n", "is not YAML"},
+      {"machine: [\n", "not YAML"},
   };
   for (const auto& [yaml, expected] : cases) {
     EXPECT_THAT(FaultsOf(yaml), HasSubstr(expected)) << yaml;

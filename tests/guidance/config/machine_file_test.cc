@@ -280,7 +280,9 @@ const BadCase kBadCases[] = {
     {"raise_above_mm_per_m: 17.5",
      "raise_above_deg: 1",
      "alarms.roll.raise_above_deg: nobody reads this key; known here: clear_below_mm_per_m"},
-    {"raise_above_mm: 15", "raise_above_mm: .inf", "alarms.sigma.raise_above_mm: '.inf' is not a number"},
+    {"raise_above_mm: 15",
+     "raise_above_mm: .inf",
+     "alarms.sigma.raise_above_mm: '.inf' is not a number"},
     {"alarms:", "alarm:", "alarm: nobody reads this key"},
     {"trend:", "- trend:", "not YAML"},
 };
