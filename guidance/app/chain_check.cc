@@ -38,23 +38,39 @@ std::vector<Sight> SightsOf(const GuidedTracks& tracks, const std::vector<Machin
   return sights;
 }
 
+constexpr double kMostMisfit = 25.0;  // five sigma
+
 // How badly the shots fit when the clock is off by so much. Each shot costs as much as it
 // contradicts, and no more than one that has nothing published around it.
 double Misfit(const std::vector<Sight>& sights, double ahead_s, const ChainOptions& options) {
-  constexpr double kMost = 25.0;
   double sum = 0.0;
   for (const Sight& sight : sights) {
     const auto place = PlaceAt(*sight.track, Shifted(sight.shot->at, -ahead_s), options.most_gap);
     if (!place) {
-      sum += kMost;
+      sum += kMostMisfit;
       continue;
     }
     const double variance_m2 =
         place->covariance_m2.trace() / 3.0 + options.log_sigma_m * options.log_sigma_m + 1e-8;
-    sum +=
-        std::min(kMost, (place->p_in_site_m - sight.shot->p_in_site_m).squaredNorm() / variance_m2);
+    sum += std::min(kMostMisfit,
+                    (place->p_in_site_m - sight.shot->p_in_site_m).squaredNorm() / variance_m2);
   }
   return sum;
+}
+
+// How many shots have published samples around them, and how many of these fit.
+struct Fitting {
+  std::size_t paired = 0;
+  std::size_t good = 0;
+};
+Fitting FittingAt(const std::vector<Sight>& sights, double ahead_s, const ChainOptions& options) {
+  Fitting fitting;
+  for (const Sight& sight : sights) {
+    if (!PlaceAt(*sight.track, Shifted(sight.shot->at, -ahead_s), options.most_gap)) continue;
+    ++fitting.paired;
+    if (Misfit({sight}, ahead_s, options) < kMostMisfit) ++fitting.good;
+  }
+  return fitting;
 }
 
 // Where to begin: a clock may be off by whole hours. Zero unless another fits clearly better.
@@ -218,6 +234,9 @@ Result<ClockEstimate, NoClockEstimate> EstimateClock(const GuidedTracks& tracks,
     estimate.sigma_s = step.sigma_s;
     if (std::abs(step.step_s) < 1e-3) break;
   }
+  const Fitting found = FittingAt(sights, estimate.ahead_s, options);
+  const std::size_t paired = std::max(found.paired, FittingAt(sights, 0.0, options).paired);
+  if (5 * found.good < 4 * paired) return Failure{NoClockEstimate::kOtherFault};
   estimate.is_significant = std::abs(estimate.ahead_s) > 3.0 * estimate.sigma_s;
   return estimate;
 }

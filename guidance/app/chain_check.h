@@ -75,6 +75,7 @@ struct ClockEstimate {
 enum class NoClockEstimate {
   kTooFewShots,     // fewer than three have a partner
   kMovedTooLittle,  // nothing moves while it is shot at: sigma beyond a minute
+  kOtherFault,      // more than a fifth contradict each other whatever the clock: it is not that
 };
 Result<ClockEstimate, NoClockEstimate> EstimateClock(const GuidedTracks& tracks,
                                                      const std::vector<MachineShot>& shots,

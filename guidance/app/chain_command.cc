@@ -93,9 +93,17 @@ ClockFinding FindClock(const Input& input,
   ClockFinding finding;
   const auto estimate = EstimateClock(input.record.tracks, input.shots, options);
   if (!estimate) {
-    finding.why_not = estimate.error() == NoClockEstimate::kTooFewShots
-                          ? "fewer than three shots have published samples around them"
-                          : "the machine moved too little while it was shot at";
+    switch (estimate.error()) {
+      case NoClockEstimate::kTooFewShots:
+        finding.why_not = "fewer than three shots have published samples around them";
+        break;
+      case NoClockEstimate::kMovedTooLittle:
+        finding.why_not = "the machine moved too little while it was shot at";
+        break;
+      case NoClockEstimate::kOtherFault:
+        finding.why_not = "more than a fifth of the shots contradict the rest whatever the clock";
+        break;
+    }
     return finding;
   }
   finding.estimate = *estimate;

@@ -187,7 +187,7 @@ std::string ChainPlot(const ChainFigures& figures) {
   script += "EOD\n";
   script += fmt::format(
       "set multiplot layout 5,1 title 'tbm check: guidance against {} independent shots, {:.1f} % "
-      "inside the published 95 %% ellipsoid' offset 0,-0.2\n",
+      "inside the published 95 % ellipsoid' offset 0,-0.2\n",
       observations.size(),
       InsidePercent(figures));
   script += fmt::format(

@@ -174,6 +174,20 @@ TEST(ChainCheck, AMachineThatStandsTellsNothingOfTheClock) {
   EXPECT_EQ(few.error(), NoClockEstimate::kTooFewShots);
 }
 
+// A metre lost on the way is no clock's doing.
+TEST(ChainCheck, AnotherFaultIsNotTakenForTheClocks) {
+  const Law law;
+  Random random("AnotherFaultIsNotTakenForTheClocks");
+  GuidedTracks tracks = Published(Strokes, 2200.0, law, random);
+  for (GuidedSample& sample : tracks.at("cutter_face")) {
+    if (sample.at > At(1000.0)) sample.p_in_site_m -= 1.0 * kForward;
+  }
+  const auto clock =
+      EstimateClock(tracks, Shots(Strokes, 100.0, 2000.0, 0.0, law, random), ChainOptions{});
+  ASSERT_FALSE(clock);
+  EXPECT_EQ(clock.error(), NoClockEstimate::kOtherFault);
+}
+
 // Errors drawn from a slanted covariance, anew for each shot.
 TEST(ChainCheck, NinetyFiveOfAHundredLieInsideTheEllipsoidWhenTheSigmasAreTrue) {
   Random random("NinetyFiveOfAHundredLieInsideTheEllipsoid");
