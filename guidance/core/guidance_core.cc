@@ -8,6 +8,10 @@
 namespace tbm {
 namespace {
 
+// A fast regrip, and the longest way that one goes.
+constexpr double kRegrip_m_per_s = 8e-3;
+constexpr double kLongestStroke_m = 2.0;
+
 FixedVector<AlarmRule, kGuidanceAlarmCount> Plain(
     const std::array<GuidanceAlarmRule, kGuidanceAlarmCount>& rules) {
   FixedVector<AlarmRule, kGuidanceAlarmCount> plain;
@@ -102,8 +106,8 @@ const Snapshot& GuidanceCore::Advance(std::span<const GuidanceInput> inputs, Tim
   return snapshot_;
 }
 
-void GuidanceCore::Take(const PrismSeen& seen) { rear_.Add(seen, camera_tilt_); }
-void GuidanceCore::Take(const SetUpKnown& set_up) { rear_.Add(set_up, camera_tilt_); }
+void GuidanceCore::Take(const PrismSeen& seen) { rear_.Add(seen, camera_tilt_, joint_); }
+void GuidanceCore::Take(const SetUpKnown& set_up) { rear_.Add(set_up, camera_tilt_, joint_); }
 
 void GuidanceCore::Take(const RelativeSeen& seen) {
   snapshot_.camera_trouble = seen.reason;
@@ -111,6 +115,7 @@ void GuidanceCore::Take(const RelativeSeen& seen) {
   if (relative_ && seen.sensed_at <= relative_->sensed_at) return;  // late or doubled
   relative_ = seen;
   front_then_.reset();
+  joint_.Add(seen.sensed_at, RearFromFront().b_from_a.translation.x());
 }
 
 void GuidanceCore::Take(const TiltSeen& seen) {
@@ -129,6 +134,7 @@ void GuidanceCore::Forget() {
   front_then_.reset();
   target_tilt_.Forget();
   camera_tilt_.Forget();
+  joint_.Forget();
 }
 
 void GuidanceCore::WatchSources() {
@@ -161,21 +167,47 @@ void GuidanceCore::PlaceRear() {
     snapshot_.rear = Without(reason);
     return;
   }
-  const double age_s = SecondsBetween(fix->at, snapshot_.valid_at);
-  const UncertainRigid3 then{fix->site_from_rear_shield, fix->covariance};
   GuidanceReason reason = GuidanceReason::kNone;
   if (station.freshness == Freshness::kCoasting) reason = GuidanceReason::kStationCoasting;
   if (fix->dof <= 1) reason = GuidanceReason::kFewPrisms;
   if (fix->exchanged) reason = GuidanceReason::kPrismsExchanged;
   if (fix->left_out) reason = GuidanceReason::kPrismLeftOut;
   if (rear_.IsSuspect()) reason = GuidanceReason::kSetUpSuspect;
-  snapshot_.rear = Stated(
-      Coasted(
-          then, fix->speed_m_per_s, fix->speed_sigma_m_per_s, std::max(age_s, 0.0), machine_.coast),
-      *station.age_s,
-      reason);
+  snapshot_.rear = Stated(RearNow(*fix), *station.age_s, reason);
   snapshot_.rear.speed_m_per_s = fix->speed_m_per_s;
   snapshot_.rear.speed_sigma_m_per_s = fix->speed_sigma_m_per_s;
+}
+
+// The last fix, grown old by the coasting law; pulled after the front shield by what the joint has
+// closed since, going about where it points. Where nobody watches the joint, a regrip may have
+// taken place at any time.
+UncertainRigid3 GuidanceCore::RearNow(const RearShieldFix& fix) const {
+  const double age_s = std::max(SecondsBetween(fix.at, snapshot_.valid_at), 0.0);
+  UncertainRigid3 now = Coasted({fix.site_from_rear_shield, fix.covariance},
+                                fix.speed_m_per_s,
+                                fix.speed_sigma_m_per_s,
+                                age_s,
+                                machine_.coast);
+  const std::optional<double> closed_m = joint_.Between(fix.at, snapshot_.valid_at);
+  const Eigen::Matrix3d turned = now.b_from_a.rotation.toRotationMatrix();
+  Eigen::Vector3d sigma_m(std::min(kRegrip_m_per_s * age_s, kLongestStroke_m), 0.0, 0.0);
+  double turn_rad2 = 0.0;
+  if (closed_m) {
+    now.b_from_a.translation += turned.col(0) * *closed_m;
+    const double across_m = machine_.track.crab_sigma_per_m * *closed_m;
+    sigma_m = {ClosingSigma(*closed_m), across_m, across_m};
+    const double steering = machine_.track.steering_per_sqrt_m;
+    turn_rad2 = steering * steering * *closed_m;
+  }
+  now.covariance.topLeftCorner<3, 3>().diagonal().array() += turn_rad2;
+  now.covariance.bottomRightCorner<3, 3>() +=
+      turned * sigma_m.cwiseAbs2().asDiagonal() * turned.transpose();
+  return now;
+}
+
+UncertainRigid3 GuidanceCore::RearFromFront() const {
+  return machine_.geometry.rear_shield_from_camera * relative_->camera_from_target *
+         Inverse(machine_.geometry.front_shield_from_target);
 }
 
 RelativeFix GuidanceCore::RelativeWithTilts() const {
@@ -230,9 +262,7 @@ void GuidanceCore::PlaceFront() {
 void GuidanceCore::PlaceJoint() {
   snapshot_.joint.reset();
   if (snapshot_.camera.freshness != Freshness::kFresh) return;
-  const UncertainRigid3 rear_from_front = machine_.geometry.rear_shield_from_camera *
-                                          relative_->camera_from_target *
-                                          Inverse(machine_.geometry.front_shield_from_target);
+  const UncertainRigid3 rear_from_front = RearFromFront();
   JointState joint;
   joint.articulation = ArticulationOf(rear_from_front.b_from_a);
   joint.articulation_covariance = CovarianceOfArticulation(rear_from_front);

@@ -8,6 +8,7 @@
 #include "guidance/core/alarm_board.h"
 #include "guidance/core/guidance_alarms.h"
 #include "guidance/core/input.h"
+#include "guidance/core/joint_closing.h"
 #include "guidance/core/machine.h"
 #include "guidance/core/rear_tracker.h"
 #include "guidance/core/snapshot.h"
@@ -22,8 +23,9 @@ namespace tbm {
 // Pure: the same inputs at the same `now`s give the same snapshots, bit for bit; a journal of a
 // shift replays. One thread; no heap after construction.
 //
-// How the numbers grow old. The rear shield rests on its last trusted fix, moved on by its speed;
-// the front shield on that and the last relative pose. Up to two periods of its source a pose is
+// How the numbers grow old. The rear shield rests on its last trusted fix, moved on by its speed
+// and by what the telescopic joint has closed since; the front shield on that and the last relative
+// pose. Up to two periods of its source a pose is
 // valid; then it coasts (guidance/shield/coast.h: sigma grows by a stated law) and says so; beyond
 // `stale_after_s`, or when a deviation's sigma exceeds `useful_sigma_m`, it is invalid.
 class GuidanceCore {
@@ -55,6 +57,8 @@ class GuidanceCore {
   void Forget();
   void WatchSources();
   void PlaceRear();
+  UncertainRigid3 RearNow(const RearShieldFix& fix) const;
+  UncertainRigid3 RearFromFront() const;
   void PlaceFront();
   void PlaceJoint();
   void PlacePoints();
@@ -70,6 +74,7 @@ class GuidanceCore {
   RearTracker rear_;
   TiltMean target_tilt_;
   TiltMean camera_tilt_;
+  JointClosing joint_;
   std::optional<RelativeSeen> relative_;  // the last usable one
   // The front shield at that exposure, as long as the rear shield was known then.
   std::optional<UncertainRigid3> front_then_;

@@ -8,8 +8,10 @@
 namespace tbm {
 namespace {
 
-// Boring or regripping, nobody says which: both lie within two sigma.
-constexpr double kSpeedPrior_m_per_s = 5e-3;
+// Beside what the joint shows: both shields may advance together, as one. Without the joint nobody
+// says whether the machine bores or regrips, and both lie within two sigma.
+constexpr double kSpeedPrior_m_per_s = 2e-3;
+constexpr double kSpeedPriorWithoutJoint_m_per_s = 5e-3;
 // Readings of one second share the vibration of that second: averaging more of them gains nothing.
 constexpr int kMostIndependentTilts = 25;
 
@@ -30,12 +32,20 @@ GuidanceReason ReasonOf(RearShieldFailure failure) {
 
 }  // namespace
 
+double ClosingSigma(double closed_m) {
+  constexpr double kDeadBandSigma_m = 0.003;
+  constexpr double kSlip = 0.02;
+  return closed_m == 0.0 ? 0.0 : std::hypot(kDeadBandSigma_m, kSlip * closed_m);
+}
+
 bool RearTracker::IsTrusted(Timestamp sensed_at) const {
   return set_up_ && set_up_->number != 0 &&
          !(set_up_->trusted_until && sensed_at > *set_up_->trusted_until);
 }
 
-void RearTracker::Add(const PrismSeen& seen, const TiltMean& camera_tilt) {
+void RearTracker::Add(const PrismSeen& seen,
+                      const TiltMean& camera_tilt,
+                      const JointClosing& joint) {
   if (seen.prism >= machine_.prisms.size()) return;
   Kept& kept = kept_[seen.prism];
   // Late and doubled readings change nothing.
@@ -44,10 +54,12 @@ void RearTracker::Add(const PrismSeen& seen, const TiltMean& camera_tilt) {
       (seen.set_up_number == kept.seen.set_up_number && seen.sensed_at > kept.seen.sensed_at);
   if (!is_newer) return;
   kept = {seen, true};
-  Fix(camera_tilt);
+  Fix(camera_tilt, joint);
 }
 
-void RearTracker::Add(const SetUpKnown& set_up, const TiltMean& camera_tilt) {
+void RearTracker::Add(const SetUpKnown& set_up,
+                      const TiltMean& camera_tilt,
+                      const JointClosing& joint) {
   const bool is_another =
       !set_up_ || set_up_->number != set_up.number || set_up_->covariance != set_up.covariance;
   set_up_ = set_up;
@@ -55,11 +67,11 @@ void RearTracker::Add(const SetUpKnown& set_up, const TiltMean& camera_tilt) {
     trouble_ = GuidanceReason::kNoSetUp;
   } else if (is_another) {
     trouble_ = past_.empty() ? GuidanceReason::kNoFix : GuidanceReason::kNone;
-    Fix(camera_tilt);
+    Fix(camera_tilt, joint);
   }
 }
 
-void RearTracker::Fix(const TiltMean& camera_tilt) {
+void RearTracker::Fix(const TiltMean& camera_tilt, const JointClosing& joint) {
   if (!set_up_ || set_up_->number == 0) return;
   RearShieldProblem problem;
   problem.station_covariance = set_up_->covariance;
@@ -77,11 +89,15 @@ void RearTracker::Fix(const TiltMean& camera_tilt) {
         SecondsBetween(kept.seen.sensed_at, newest) > machine_.fix_window_s) {
       continue;
     }
+    const std::optional<double> moved_m = joint.Between(newest, kept.seen.sensed_at);
+    if (!moved_m) problem.speed_sigma_m_per_s = kSpeedPriorWithoutJoint_m_per_s;
     problem.fixes.push_back({static_cast<int>(i),
                              kept.seen.sensed_at,
                              kept.seen.p_in_site,
                              kept.seen.covariance,
-                             kept.seen.by_station});
+                             kept.seen.by_station,
+                             moved_m.value_or(0.0),
+                             ClosingSigma(moved_m.value_or(0.0))});
   }
   if (problem.fixes.empty()) return;
   problem.at = newest;

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "guidance/core/input.h"
+#include "guidance/core/joint_closing.h"
 #include "guidance/core/machine.h"
 #include "guidance/core/reason.h"
 #include "guidance/core/tilt_mean.h"
@@ -12,6 +13,10 @@
 
 namespace tbm {
 
+// How well the closing of the joint says how far the rear shield has come: its dead band, and what
+// the front shield may have slipped back.
+double ClosingSigma(double closed_m);
+
 // The rear shield from what the total station sees, prism by prism: keeps the last reading of each
 // prism, makes a fix with every new one, and remembers past fixes, because a check of the
 // references may say later that the newest are not to be used. No heap.
@@ -19,8 +24,8 @@ class RearTracker {
  public:
   RearTracker(const Machine& machine, const Rig& rig) : machine_(machine), rig_(rig) {}
 
-  void Add(const PrismSeen& seen, const TiltMean& camera_tilt);
-  void Add(const SetUpKnown& set_up, const TiltMean& camera_tilt);
+  void Add(const PrismSeen& seen, const TiltMean& camera_tilt, const JointClosing& joint);
+  void Add(const SetUpKnown& set_up, const TiltMean& camera_tilt, const JointClosing& joint);
 
   // The newest fix that rests on nothing but trusted readings.
   const RearShieldFix* fix() const;
@@ -44,7 +49,7 @@ class RearTracker {
     bool has_own_heading = true;  // not taken from an earlier fix
   };
 
-  void Fix(const TiltMean& camera_tilt);
+  void Fix(const TiltMean& camera_tilt, const JointClosing& joint);
   std::optional<HeadingFix> EarlierHeading(Timestamp at) const;
   bool IsTrusted(Timestamp sensed_at) const;
 

@@ -165,11 +165,13 @@ void Assemble(const RearShieldProblem& problem,
     const int prism = naming.PrismOf(fix);
     const double ahead_s = SecondsBetween(problem.at, fix.sensed_at);
     Eigen::Vector3d p = PlaceOf(problem, prism);
-    p.x() += state.speed_m_per_s * ahead_s;
+    p.x() += state.speed_m_per_s * ahead_s + fix.moved_m;
     system.rows.block<3, 6>(row, 0) = PointByError(state.site_from_shield, p);
     system.rows.block<3, 1>(row, 6) = turned.col(0) * ahead_s;
     system.misclosure.segment<3>(row) = fix.p_in_site - state.site_from_shield * p;
-    system.covariance.block<3, 3>(row, row) += fix.covariance;
+    system.covariance.block<3, 3>(row, row) +=
+        fix.covariance +
+        fix.moved_sigma_m * fix.moved_sigma_m * turned.col(0) * turned.col(0).transpose();
     by_station.middleRows<3>(row) = fix.by_station;
     for (std::size_t other = 0; other <= prism_of_row.size(); ++other) {
       const bool same = other == prism_of_row.size() || prism_of_row[other] == prism;

@@ -29,6 +29,10 @@ struct PrismFix {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // [m^2] of this reading alone
   // What the station's errors (east, north, up [m], circle zero [rad]) do to it.
   Eigen::Matrix<double, 3, 4> by_station = Eigen::Matrix<double, 3, 4>::Zero();
+  // How far the shield was then along its own x axis from where it is at the problem's moment, as
+  // something else has measured it: the telescopic joint. Beside what `speed` explains.
+  double moved_m = 0.0;
+  double moved_sigma_m = 0.0;
 };
 
 // The direction against gravity as the shield's inclinometer sees it, mounting taken out.
@@ -94,7 +98,7 @@ struct RearShieldOptions {
 // Where the rear shield is and how it is turned, by maximum likelihood from any of: three or more
 // prisms; two and the tilt; one, the tilt and a heading; more of each.
 //
-//   q_i = R (p_i + e_x v (t_i - t)) + t_site + reading + station error
+//   q_i = R (p_i + e_x (v (t_i - t) + moved_i)) + t_site + reading + station error
 //
 // Seven unknowns (turn, shift, speed v), Gauss-Newton. The covariance of all coordinates is built
 // whole: the station's four errors are common to all fixes, a prism's calibration error to all

@@ -189,7 +189,8 @@ void Drive::SeeTilts(const Rig& built,
 
 void Drive::SeePrisms(const Rigid3& site_from_rear,
                       const Rig& built,
-                      const Rigid3& rear_from_camera) {
+                      const Rigid3& rear_from_camera,
+                      RelativeSeen board) {
   // Behind the machine, on the wall.
   const Eigen::Vector3d back = site_from_rear.rotation * Eigen::Vector3d(-1.0, 0.02, 0.005);
   Station believed;
@@ -225,16 +226,17 @@ void Drive::SeePrisms(const Rigid3& site_from_rear,
     const SightedCovariance covariance =
         CovarianceSighted(believed, *p, sight, {noise_.angle_rad, noise_.angle_rad, slope_sigma_m});
     SeeTilts(built, up_in_camera, {}, now_);
+    board.sensed_at = now_;  // the camera goes on while the station measures
+    inputs_.push_back(board);
     inputs_.push_back(
         PrismSeen{set_up.number, i, now_, *p, covariance.of_reading, covariance.by_station});
     now_ = After(now_, 4.0);
   }
 }
 
-void Drive::SeeBoard(const Rig& built,
-                     const Rigid3& camera_from_target,
-                     const Eigen::Vector3d& up_in_camera) {
-  const Eigen::Vector3d up_in_target = camera_from_target.rotation.conjugate() * up_in_camera;
+RelativeSeen Drive::SeeBoard(const Rig& built,
+                             const Rigid3& camera_from_target,
+                             const Eigen::Vector3d& up_in_camera) {
   PoseProblem problem = ExactProblem(built, {camera_from_target, up_in_camera});
   for (LedObservation& led : problem.leds) {
     for (int axis = 0; axis < 2; ++axis) {
@@ -249,16 +251,14 @@ void Drive::SeeBoard(const Rig& built,
     (*tilt)->inclination.gamma_rad += Drawn(ErrorSource::kTiltReading, (*tilt)->sigma_rad);
   }
   problem.rig = &machine_.rig;
-  SeeTilts(built, up_in_camera, up_in_target, now_);
   RelativeSeen seen;
-  seen.sensed_at = now_;
   const auto pose = SolveFused(problem);
   if (pose) {
     seen.status = PoseStatus::kOk;
     seen.camera_from_target = {pose->camera_from_target, pose->covariance};
     seen.tilts_used = true;
   }
-  inputs_.push_back(seen);
+  return seen;
 }
 
 Drive::Epoch Drive::Measure(double chainage_m) {
@@ -290,9 +290,12 @@ Drive::Epoch Drive::Measure(double chainage_m) {
   const Eigen::Vector3d up_in_camera =
       (site_from_rear * rear_from_camera).rotation.conjugate() * Eigen::Vector3d::UnitZ();
 
-  SeePrisms(site_from_rear, built, rear_from_camera);
+  RelativeSeen board = SeeBoard(built, camera_from_target, up_in_camera);
+  SeePrisms(site_from_rear, built, rear_from_camera, board);
   now_ = After(now_, random_.Uniform(0.0, 10.0));
-  SeeBoard(built, camera_from_target, up_in_camera);
+  SeeTilts(built, up_in_camera, camera_from_target.rotation.conjugate() * up_in_camera, now_);
+  board.sensed_at = now_;
+  inputs_.push_back(board);
   now_ = After(now_, 0.1);
   epoch.snapshot = core_.Advance(inputs_, now_);
   return epoch;

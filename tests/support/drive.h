@@ -86,14 +86,17 @@ class Drive {
   double Drawn(ErrorSource source, double sigma);
   Rigid3 Built(ErrorSource source, const UncertainRigid3& drawing);
   Rig BuiltRig();
-  void SeePrisms(const Rigid3& site_from_rear, const Rig& built, const Rigid3& rear_from_camera);
+  void SeePrisms(const Rigid3& site_from_rear,
+                 const Rig& built,
+                 const Rigid3& rear_from_camera,
+                 RelativeSeen board);
   void SeeTilts(const Rig& built,
                 const Eigen::Vector3d& up_in_camera,
                 std::optional<Eigen::Vector3d> up_in_target,
                 Timestamp around);
-  void SeeBoard(const Rig& built,
-                const Rigid3& camera_from_target,
-                const Eigen::Vector3d& up_in_camera);
+  RelativeSeen SeeBoard(const Rig& built,
+                        const Rigid3& camera_from_target,
+                        const Eigen::Vector3d& up_in_camera);
 
   const GuidedMachine& machine_;
   DriveNoise noise_;

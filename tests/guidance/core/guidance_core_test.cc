@@ -57,10 +57,26 @@ class Core : public testing::Test {
   }
 
   const Snapshot& Begin() { return core_.Advance(round_, at_); }
-  // What keeps coming while one source is silent.
+  // What keeps coming while one source is silent: the camera's poses, every five seconds.
   const Snapshot& CameraGoesOn(Duration after) {
     const auto live = Without<SetUpKnown>(Without<PrismSeen>(round_));
+    while (went_on_ + seconds(5) < after) {
+      went_on_ += seconds(5);
+      core_.Advance(Later(live, went_on_), at_ + went_on_);
+    }
+    went_on_ = after;
     return core_.Advance(Later(live, after), at_ + after);
+  }
+  // The target comes nearer to the camera by so much along the shield's x axis.
+  static std::vector<GuidanceInput> Closed(std::vector<GuidanceInput> inputs, double closed_m) {
+    const Rigid3& rear_from_camera = TheMachine().machine.geometry.rear_shield_from_camera.b_from_a;
+    for (GuidanceInput& input : inputs) {
+      if (auto* pose = std::get_if<RelativeSeen>(&input)) {
+        pose->camera_from_target.b_from_a.translation +=
+            rear_from_camera.rotation.conjugate() * Eigen::Vector3d(-closed_m, 0.0, 0.0);
+      }
+    }
+    return inputs;
   }
   const Snapshot& StationGoesOn(Duration after) {
     return core_.Advance(Later(Without<RelativeSeen>(round_), after), at_ + after);
@@ -78,6 +94,7 @@ class Core : public testing::Test {
   Drive drive_;
   std::vector<GuidanceInput> round_;
   Timestamp at_;
+  Duration went_on_{};
   GuidanceCore core_{TheMachine().machine, TheMachine().rig, TheMachine().axis};
 };
 
@@ -105,11 +122,13 @@ TEST_F(Core, WithAllSourcesEveryNumberIsValid) {
   ASSERT_TRUE(snapshot.lead && snapshot.joint && snapshot.ring_number);
   EXPECT_EQ(snapshot.fix->prisms_used, 4);
   // 2100 m is the cutter's place; the rear shield's datum is 7 to 8 m behind, rings are 1.5 m.
-  EXPECT_NEAR(static_cast<double>(*snapshot.ring_number), 1.0 + std::floor(92.5 / 1.5), 1.0);
+  EXPECT_NEAR(static_cast<double>(*snapshot.ring_number), 1.0 + 92.7 / 1.5, 0.9);
   EXPECT_GE(*snapshot.joint->stroke_m, -0.01);
   EXPECT_LE(*snapshot.joint->stroke_m, 1.21);
   EXPECT_EQ(snapshot.ahead.size(), 20u);
-  // What may happen on the way only grows.
+  // What is common to all looks is in the band from its beginning; what may happen on the way only
+  // grows.
+  EXPECT_GT(snapshot.ahead[0].right.sigma_m, Cutter().deviation.right_sigma_m * 1.2);
   for (std::size_t i = 1; i < snapshot.ahead.size(); ++i) {
     EXPECT_GT(snapshot.ahead[i].right.sigma_m, snapshot.ahead[i - 1].right.sigma_m);
   }
@@ -124,6 +143,7 @@ TEST_F(Core, WithTheStationBlockedTheNumbersCoastSaySoAndThenEnd) {
   EXPECT_EQ(core_.snapshot().station.freshness, Freshness::kCoasting);
   EXPECT_EQ(Cutter().worth, Worth::kDegraded);
   EXPECT_EQ(Cutter().reason, GuidanceReason::kStationCoasting);
+  EXPECT_EQ(core_.snapshot().front.age_s, core_.snapshot().rear.age_s);  // the older of both
   EXPECT_NEAR(core_.snapshot().rear.age_s, 240.0, 30.0);
   // The law of guidance/shield/coast.h: 0.02 mm/s across at the rear shield's datum, and 0.8
   // microrad/s of turning over the 8 m to the cutter.
@@ -143,6 +163,115 @@ TEST_F(Core, WithTheStationBlockedTheNumbersCoastSaySoAndThenEnd) {
   EXPECT_TRUE(core_.snapshot().ahead.empty());
 }
 
+// Stroke done, the rear shield is pulled after the front one at 10 mm/s, and the sight to the
+// prisms is blocked by it.
+TEST_F(Core, ARegripWithTheStationBlockedMovesTheRearShieldAndNotTheFrontOne) {
+  Begin();
+  const Rigid3 rear = core_.snapshot().rear.site_from_shield.b_from_a;
+  const Rigid3 front = core_.snapshot().front.site_from_shield.b_from_a;
+  const auto live = Without<SetUpKnown>(Without<PrismSeen>(round_));
+  for (int i = 1; i <= 600; ++i) {
+    const Duration after = milliseconds(200 * i);
+    core_.Advance(Closed(Later(live, after), std::min(0.8, 0.010 * 0.2 * i)), at_ + after);
+  }
+  const ShieldState& rear_now = core_.snapshot().rear;
+  const ShieldState& front_now = core_.snapshot().front;
+  const Eigen::Vector3d went = rear_now.site_from_shield.b_from_a.translation - rear.translation;
+  const Eigen::Vector3d ahead = rear.rotation * Eigen::Vector3d::UnitX();
+  const double drifted_m = std::abs(rear_now.speed_m_per_s) * 125.0;  // of the fix' own speed
+  EXPECT_NEAR(went.dot(ahead), 0.8, 0.02 + drifted_m);
+  EXPECT_LT((went - went.dot(ahead) * ahead).norm(), 1e-6);
+  EXPECT_LT((front_now.site_from_shield.b_from_a.translation - front.translation).norm(),
+            0.02 + drifted_m);
+  // It says what it does not know of the way: 2 % of it along, 3 mm/m across.
+  const Eigen::Matrix3d covariance = rear_now.site_from_shield.covariance.bottomRightCorner<3, 3>();
+  EXPECT_GT(std::sqrt(ahead.dot(covariance * ahead)), 0.016);
+  EXPECT_GT(Cutter().deviation.right_sigma_m, 0.003);
+  EXPECT_NE(Cutter().worth, Worth::kInvalid);
+}
+
+// The same while the front shield bores: the joint opens, and the rear shield stands.
+TEST_F(Core, ABoringStrokeDoesNotMoveTheRearShield) {
+  Begin();
+  const Rigid3 rear = core_.snapshot().rear.site_from_shield.b_from_a;
+  const auto live = Without<SetUpKnown>(Without<PrismSeen>(round_));
+  for (int i = 1; i <= 300; ++i) {
+    const Duration after = milliseconds(200 * i);
+    const double shaking_m = 0.0015 * std::sin(1.3 * i);  // vibration closes and opens it again
+    core_.Advance(Closed(Later(live, after), -0.0002 * i + shaking_m), at_ + after);
+  }
+  const double drifted_m = std::abs(core_.snapshot().rear.speed_m_per_s) * 75.0;
+  EXPECT_LT((core_.snapshot().rear.site_from_shield.b_from_a.translation - rear.translation).norm(),
+            0.001 + drifted_m);
+}
+
+// Prisms measured one after the other while the shield is pulled: the joint says how far each was.
+TEST_F(Core, ARoundOfPrismsInTheMiddleOfARegripMakesAFix) {
+  Begin();
+  const Rigid3 before = core_.snapshot().rear.site_from_shield.b_from_a;
+  const Eigen::Vector3d ahead = before.rotation * Eigen::Vector3d::UnitX();
+  const auto live = Without<SetUpKnown>(Without<PrismSeen>(round_));
+  const auto prisms = Only<PrismSeen>(round_);
+  std::size_t measured = 0;
+  // Pulled by 10 mm/s from 10 s to 30 s, standing before and behind; a prism every 8 s.
+  for (int i = 1; i <= 250; ++i) {
+    const Duration after = milliseconds(200 * i);
+    const double closed_m = 0.010 * std::clamp(0.2 * i - 10.0, 0.0, 20.0);
+    auto inputs = Closed(Later(live, after), closed_m);
+    if (i % 40 == 30 && measured < prisms.size()) {
+      PrismSeen prism = std::get<PrismSeen>(prisms[measured++]);
+      prism.sensed_at = at_ + after;
+      prism.p_in_site += closed_m * ahead;
+      inputs.push_back(prism);
+    }
+    core_.Advance(inputs, at_ + after);
+  }
+  ASSERT_EQ(measured, 4u);
+  EXPECT_EQ(core_.snapshot().fix_trouble, GuidanceReason::kNone);
+  ASSERT_TRUE(core_.snapshot().fix);
+  EXPECT_EQ(core_.snapshot().fix->prisms_used, 4);
+  EXPECT_FALSE(core_.snapshot().fix->left_out);
+  const Eigen::Vector3d went =
+      core_.snapshot().rear.site_from_shield.b_from_a.translation - before.translation;
+  EXPECT_NEAR(went.dot(ahead), 0.2, 0.02);
+}
+
+// Nobody watches the joint: along the drive the rear shield may be wherever a regrip takes it.
+TEST_F(Core, WithoutTheCameraARegripMayHaveTakenPlace) {
+  Begin();
+  core_.Advance({}, at_ + seconds(50));
+  const ShieldState& rear = core_.snapshot().rear;
+  ASSERT_NE(rear.worth, Worth::kInvalid);
+  const Eigen::Vector3d ahead = rear.site_from_shield.b_from_a.rotation * Eigen::Vector3d::UnitX();
+  const Eigen::Matrix3d covariance = rear.site_from_shield.covariance.bottomRightCorner<3, 3>();
+  EXPECT_GT(std::sqrt(ahead.dot(covariance * ahead)), 0.3);
+}
+
+TEST(JointClosing, CountsWhatClosesAndNothingElse) {
+  JointClosing joint;
+  const Timestamp begin{1'700'000'000'000'000'000};
+  EXPECT_FALSE(joint.Between(begin, begin));
+  const auto at = [&](double s) {
+    return Timestamp{begin.ns + static_cast<std::int64_t>(s * 1e9)};
+  };
+  const auto length = [](double s) {  // bores 0.3 m, closes it, bores again
+    if (s < 300.0) return 3.0 + 0.001 * s;
+    return s < 330.0 ? 3.3 - 0.01 * (s - 300.0) : 3.0 + 0.001 * (s - 330.0);
+  };
+  for (int i = 0; i <= 4000; ++i) joint.Add(at(0.1 * i), length(0.1 * i));
+  EXPECT_NEAR(*joint.Between(at(0), at(299)), 0.0, 1e-12);
+  EXPECT_NEAR(*joint.Between(at(0), at(400)), 0.3, 0.006);
+  EXPECT_NEAR(*joint.Between(at(310), at(320)), 0.1, 0.011);
+  EXPECT_NEAR(*joint.Between(at(320), at(310)), -0.1, 0.011);
+  EXPECT_FALSE(joint.Between(at(-5), at(10)));
+  EXPECT_FALSE(joint.Between(at(10), at(430)));
+  // A gap, or a pose that cannot be: nothing is known of what was before.
+  joint.Add(at(430), 3.07);
+  EXPECT_FALSE(joint.Between(at(399), at(430)));
+  joint.Add(at(433), 3.37);
+  EXPECT_FALSE(joint.Between(at(430), at(433)));
+}
+
 TEST_F(Core, WithTheCameraDirtyTheFrontShieldCoastsAndThenEnds) {
   Begin();
   StationGoesOn(seconds(20));
@@ -150,6 +279,9 @@ TEST_F(Core, WithTheCameraDirtyTheFrontShieldCoastsAndThenEnds) {
   EXPECT_EQ(core_.snapshot().front.worth, Worth::kDegraded);
   EXPECT_EQ(core_.snapshot().front.reason, GuidanceReason::kCameraCoasting);
   EXPECT_NEAR(core_.snapshot().front.age_s, 20.0, 0.5);
+  const Eigen::Matrix3d now = core_.snapshot().front.site_from_shield.covariance.block<3, 3>(3, 3);
+  // 1 mm/s along, in 20 s.
+  EXPECT_GT(std::sqrt(now.trace()), 0.02);
   EXPECT_FALSE(core_.snapshot().joint);  // nothing is seen of the joint now
   StationGoesOn(seconds(130));
   EXPECT_EQ(core_.snapshot().front.worth, Worth::kInvalid);
@@ -189,6 +321,7 @@ TEST_F(Core, WhatWasSeenSinceTheLastGoodCheckIsNotUsedWhenTheStationIsSuspect) {
   EXPECT_EQ(core_.snapshot().rear.reason, GuidanceReason::kSetUpSuspect);
   EXPECT_LT((core_.snapshot().rear.site_from_shield.b_from_a.translation - before).norm(), 0.01);
   EXPECT_NEAR(core_.snapshot().rear.age_s, 45.0, 12.0);
+  went_on_ = seconds(41);
   CameraGoesOn(seconds(43));
   EXPECT_EQ(StateOf(GuidanceAlarm::kSetUpNotGood), AlarmState::kUnacknowledged);
   // The check was repeated and is good: the readings count again.
@@ -309,6 +442,7 @@ TEST_F(Core, LateAndDoubledInputsChangeNothing) {
     }
   }
   core_.Advance(Without<TiltSeen>(late), at_);
+  EXPECT_EQ(Cutter().p_in_site.p, said);
   core_.Advance(Without<TiltSeen>(round_), at_);
   EXPECT_EQ(Cutter().p_in_site.p, said);
 }
