@@ -348,7 +348,7 @@ TEST_F(JournalOfAShift, InputsThatAreMissingAreCounted) {
   int poses = 0;
   const auto content =
       ReadMcap(bytes_, [&](const McapChannel& channel, const McapMessage& message) {
-        if (channel.topic == dds::kRelativePoseTopic.name && ++poses == 2) return;
+        if (channel.topic == dds::kRelativePoseTopic.name && ++poses == 10) return;
         replay.Take(channel, message);
       });
   ASSERT_TRUE(content);
