@@ -14,6 +14,7 @@
 #include "guidance/app/journal_files.h"
 #include "guidance/app/journal_reading.h"
 #include "guidance/app/output_file.h"
+#include "guidance/journal/local_record.h"
 #include "idl/cpp/codec.h"
 #include "idl/cpp/topics.h"
 
@@ -253,6 +254,8 @@ class Exporting {
       return topic.row.name == channel.topic;
     });
     const Topic* topic = found == known.end() ? nullptr : &*found;
+    // What replay needs, and no topic.
+    if (channel.topic == kStepTopic || channel.topic == kFileTopic) return nullptr;
     if (!wanted_.empty() && (topic == nullptr || !wanted_.contains(topic->row.name)))
       return nullptr;
     const std::string foreignness = Foreignness(channel, topic);

@@ -3,6 +3,7 @@
 #include <array>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include <fmt/format.h>
@@ -168,7 +169,7 @@ class GuidanceProcess::Impl {
     while (!stop.stop_requested()) {
       inbox_.TakeAll(clock_.Steady() + kLongestWait, stop, &taken);
       for (const GuidanceInbox::Received& one : taken) {
-        step_.Take(one.message);
+        if (!step_.Take(one.message)) TellStranger(one.message);
         if (record_) record_->Add(one.message, one.received_at);
       }
       const Timestamp now = clock_.Now();
@@ -188,6 +189,7 @@ class GuidanceProcess::Impl {
 
  private:
   static constexpr std::size_t kMostReports = 256;
+  static constexpr std::size_t kMostStrangers = 16;
 
   template <class Message>
   void Listen(dds::Participant& participant, std::optional<dds::Subscriber<Message>>& subscriber) {
@@ -243,6 +245,20 @@ class GuidanceProcess::Impl {
     event.text = std::string_view(text);
     Tell(event);
     if (record_) record_->events.Add(event, event.at);
+  }
+
+  // Mostly a slip of the pen in one of the configurations; told once for each.
+  void TellStranger(const GuidanceMessage& message) {
+    const std::string name =
+        std::visit([](const auto& one) { return std::string(one.machine_id.view()); }, message);
+    if (strangers_.size() == kMostStrangers || !strangers_.insert(name).second) return;
+    TellOwn("guidance_process",
+            "other_machine",
+            dds::Severity::kWarning,
+            false,
+            fmt::format("machine '{}' is heard and ignored; this guidance is of '{}' (machine_id)",
+                        name,
+                        machine_.machine.machine_id));
   }
 
   void TellHealth() {
@@ -339,6 +355,7 @@ class GuidanceProcess::Impl {
   std::uint64_t own_event_number_ = 0;
   std::mutex alarm_mutex_;
   std::vector<dds::Alarm> reported_;
+  std::set<std::string> strangers_;
   // Last: they stop before what they write to.
   std::optional<dds::Subscriber<dds::RelativePose>> poses_in_;
   std::optional<dds::Subscriber<dds::TiltReading>> tilts_in_;

@@ -33,12 +33,12 @@ GuidanceStep::GuidanceStep(const Machine& machine,
   output_.events.reserve(kGuidanceAlarmCount);
 }
 
-void GuidanceStep::Take(const GuidanceMessage& message) {
+bool GuidanceStep::Take(const GuidanceMessage& message) {
   const auto is_ours = [&](const auto& one) { return one.machine_id == names_.machine_id; };
-  if (!std::visit(is_ours, message)) return;
+  if (!std::visit(is_ours, message)) return false;
   if (const auto* command = std::get_if<dds::Command>(&message)) {
     if (command->addressee.view() == kGuidanceSource) commands_.push_back(*command);
-    return;
+    return true;
   }
   std::optional<GuidanceInput> input;
   if (const auto* pose = std::get_if<dds::RelativePose>(&message)) {
@@ -51,6 +51,7 @@ void GuidanceStep::Take(const GuidanceMessage& message) {
     input = InputOf(*set_up);
   }
   if (input) inputs_.push_back(*input);
+  return true;
 }
 
 const GuidanceStep::Output& GuidanceStep::Step(Timestamp now) {

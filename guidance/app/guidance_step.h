@@ -30,8 +30,8 @@ class GuidanceStep {
                const DesignAxis& axis,
                const std::string& machine_sha256);
 
-  // Another machine's messages are ignored.
-  void Take(const GuidanceMessage& message);
+  // False for another machine's message, which is ignored.
+  bool Take(const GuidanceMessage& message);
 
   struct Output {
     dds::ShieldPose rear;

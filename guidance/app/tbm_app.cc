@@ -23,9 +23,10 @@ namespace tbm {
 namespace {
 
 constexpr const char* kAbout =
-    "Where the front shield of a tunnel boring machine stands, from camera pictures of its LED "
-    "target and\n"
-    "from inclinometers. Works on recorded runs and shows the live system.";
+    "The surveyor's tool of a tunnel boring machine's guidance: shows the live system and asks it "
+    "for "
+    "things,\n"
+    "works on recorded runs, journals and design axes, and checks against a total station.";
 
 constexpr const char* kExamples =
     "Examples\n"
@@ -36,7 +37,7 @@ constexpr const char* kExamples =
     "  tbm axis check tests/data/axis/example.xml\n"
     "      what is odd in the file of a design axis; eval, project and plot work on it\n"
     "  tbm watch\n"
-    "      the live values of a running camera box\n"
+    "      what the operator steers by, and all that it rests on\n"
     "  tbm record --out journal; tbm export journal --out tables\n"
     "      everything that is published, kept as MCAP files, and as tables\n"
     "\n"

@@ -126,7 +126,7 @@ std::array<GuidanceAlarmRule, kGuidanceAlarmCount> GuidanceAlarmRules(const Mach
        1.0},
       {Limit("axis_ends",
              kMedium,
-             {-10.0, -kAxisWarning_m - 1.0},
+             {-kAxisWarning_m, -kAxisWarning_m - 1.0},
              "the design axis ends in front of the machine",
              "load the axis of the next section"),
        "m",

@@ -7,7 +7,7 @@ namespace tbm {
 namespace {
 
 constexpr double kDeadBand_m = 0.005;      // vibration and noise stay below
-constexpr double kFastest_m_per_s = 0.05;  // five times a fast regrip
+constexpr double kFastest_m_per_s = 0.15;  // ten times a usual regrip
 constexpr double kLargestJump_m = 0.02;    // beside that, from one pose to the next
 constexpr Duration kLongestGap = std::chrono::seconds(15);
 

@@ -36,7 +36,9 @@ class Neighbours {
   }
 
   // The round of readings, as if it had ended now.
-  void Say() {
+  void Say() { SayAs({}); }
+  // Of another machine, unless empty.
+  void SayAs(std::string_view machine_id) {
     const Duration later = clock_.Now() - drive_.now();
     for (GuidanceMessage message : messages_.From(drive_.inputs())) {
       std::visit(
@@ -45,6 +47,7 @@ class Neighbours {
             if constexpr (requires { one.published_at; }) {
               one.published_at = one.published_at + later;
             }
+            if (!machine_id.empty()) one.machine_id = machine_id;
             Write(one);
           },
           message);
@@ -76,6 +79,13 @@ class Listener {
     const std::lock_guard lock(mutex_);
     return guidance_;
   }
+  bool HasHeardOf(std::string_view stranger) {
+    const std::lock_guard lock(mutex_);
+    return std::any_of(events_.begin(), events_.end(), [&](const dds::Event& event) {
+      return event.code.view() == "other_machine" &&
+             event.text.view().find(stranger) != std::string_view::npos;
+    });
+  }
   std::vector<dds::AlarmStatus> alarms() {
     const std::lock_guard lock(mutex_);
     return alarms_;
@@ -85,12 +95,18 @@ class Listener {
   std::mutex mutex_;
   dds::Guidance guidance_;
   std::vector<dds::AlarmStatus> alarms_;
+  std::vector<dds::Event> events_;
   dds::Participant participant_{OnLoopback(kDomain, "listener")};
   dds::Subscriber<dds::Guidance> guidances_{
       participant_, [this](const dds::Guidance& m, const dds::SampleFacts&) {
         const std::lock_guard lock(mutex_);
         guidance_ = m;
       }};
+  dds::Subscriber<dds::Event> told_{participant_,
+                                    [this](const dds::Event& m, const dds::SampleFacts&) {
+                                      const std::lock_guard lock(mutex_);
+                                      events_.push_back(m);
+                                    }};
   dds::Subscriber<dds::AlarmStatus> alarm_states_{
       participant_, [this](const dds::AlarmStatus& m, const dds::SampleFacts&) {
         const std::lock_guard lock(mutex_);
@@ -143,6 +159,10 @@ TEST(GuidanceProcess, GuidesFromItsNeighboursTopicsAndItsJournalReplaysBitForBit
     EXPECT_THAT(answer.str(), testing::HasSubstr("nobody does not answer: does it run"));
     EXPECT_TRUE(
         Eventually([&] { return phase_of("position_lost") == dds::AlarmPhase::kAcknowledged; }));
+
+    // Another machine's box on the same domain: ignored, and told once.
+    neighbours.SayAs("TBM-2");
+    ASSERT_TRUE(Eventually([&] { return listener.HasHeardOf("TBM-2"); }));
 
     // With them it knows where the machine is, and the alarm goes.
     ASSERT_TRUE(Eventually([&] {
