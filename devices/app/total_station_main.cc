@@ -1,5 +1,7 @@
 #include <cstdio>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -59,6 +61,17 @@ int PrintFaults(const RigFileFaults& faults) {
   return kConfiguration;
 }
 
+// Before anything is measured: a set-up that cannot be kept would be lost at the first restart.
+std::optional<std::string> StateFileProblem(const std::string& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) return "is a folder; a file's name is wanted";
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder, ignored)) {
+    return "its folder is not there";
+  }
+  return {};
+}
+
 int Run(const StationConfig& config,
         const Machine& machine,
         const dds::ParticipantConfig& participant_config) {
@@ -103,6 +116,10 @@ int Run(const StationConfig& config,
 int Main(const std::string& config_file, bool check_only) {
   const auto config = LoadStationConfig(config_file);
   if (!config) return PrintFaults(config.error());
+  if (const auto problem = StateFileProblem(config->state_file)) {
+    fmt::print(stderr, "{}: state_file: {}: {}\n", config_file, config->state_file, *problem);
+    return kConfiguration;
+  }
   const auto machine = LoadMachineFile(config->machine_file);
   if (!machine) return PrintFaults(machine.error());
   const auto participant_config =

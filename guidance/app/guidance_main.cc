@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <filesystem>
 #include <string>
 #include <thread>
 #include <vector>
@@ -26,6 +27,15 @@ int Main(const std::string& config_file, bool check_only) {
   const auto config = LoadGuidanceConfig(config_file);
   if (!config) {
     for (const RigFileFault& fault : config.error()) fmt::print(stderr, "{}\n", fault.Text());
+    return static_cast<int>(ExitCode::kBadInput);
+  }
+  std::error_code ignored;
+  if (std::filesystem::exists(config->journal_folder, ignored) &&
+      !std::filesystem::is_directory(config->journal_folder, ignored)) {
+    fmt::print(stderr,
+               "{}: journal.folder: {} is a file; a folder is wanted\n",
+               config_file,
+               config->journal_folder);
     return static_cast<int>(ExitCode::kBadInput);
   }
   MachineFaults warnings;
