@@ -5,6 +5,7 @@ dies, stops clean; log and memory are bounded.
 The amd64 package stands for the armhf one: unit, scripts and configuration are the same files.
 """
 import argparse
+import glob
 import os
 import re
 import shutil
@@ -56,6 +57,7 @@ IMPATIENT = """[Service]
 WatchdogSec=3
 """
 SIMULATOR = """[Service]
+Environment=LD_LIBRARY_PATH=/opt/lib
 ExecStart=/opt/tbm_sim --rig /opt/rig.yaml --target-port /run/sim/target --camera-port /run/sim/camera
 User=tbm-camera-box
 RuntimeDirectory=sim
@@ -125,6 +127,13 @@ def prepare(box, root, package, simulator, source):
     box.install_dependencies(root, package)
     box.install(root, [package])
     shutil.copy(simulator, f"{root}/opt/tbm_sim")
+    # What the simulator loads and the box does not: it is no package of this file system.
+    os.makedirs(f"{root}/opt/lib")
+    for line in world.run(["ldd", simulator]).splitlines():
+        name, _, path = line.strip().partition(" => ")
+        library = path.split(" (")[0]
+        if library.startswith("/") and not glob.glob(f"{root}/usr/lib/*/{name}"):
+            shutil.copy(library, f"{root}/opt/lib/{name}")
     shutil.copy(f"{source}/pose/app/example/rig.yaml", f"{root}/opt/rig.yaml")
     config = f"{root}/etc/tbm/camera_box.yaml"
     with open(config, encoding="utf-8") as file:
