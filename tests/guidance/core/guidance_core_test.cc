@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/drive.h"
-#include "tests/support/no_alloc.h"
 
 namespace tbm::test {
 namespace {
@@ -530,17 +529,6 @@ TEST_F(Core, TheSameInputsGiveTheSameBits) {
     if (!a.ahead.empty()) {
       ASSERT_EQ(a.ahead.back().right.off_m, b.ahead.back().right.off_m);
     }
-  }
-}
-
-TEST_F(Core, AStepTakesNoHeap) {
-  Begin();
-  Drive drive(TheMachine(), {}, "no heap");
-  for (int i = 0; i < 20; ++i) {
-    drive.Measure(2060.0 + 5.0 * i);
-    const HeapCounter heap;
-    core_.Advance(drive.inputs(), drive.now());
-    EXPECT_EQ(heap.Count(), 0);
   }
 }
 
