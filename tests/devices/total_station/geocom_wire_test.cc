@@ -306,7 +306,8 @@ TEST(TotalStationSim, SaysWhatIsWrongWithItsCommandLine) {
                    "--fault",
                    "slow:0.1"}),
               HasSubstr("--fault slow:0.1: wanted KIND:RATIO"));
-  EXPECT_THAT(run({"--hide", "right"}), HasSubstr("--hide right: wanted one prism by name, such as left"));
+  EXPECT_THAT(run({"--hide", "right"}),
+              HasSubstr("--hide right: wanted one prism by name, such as left"));
   EXPECT_THAT(run({"--swap", "left"}), HasSubstr("--swap left: wanted"));
   EXPECT_THAT(run({"--station", "1,2"}), HasSubstr("--station 1,2: wanted X,Y,Z"));
   EXPECT_THAT(run({"--knock", "1,2,3"}), HasSubstr("--knock 1,2,3: wanted"));
