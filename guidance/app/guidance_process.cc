@@ -370,7 +370,7 @@ GuidanceProcess::GuidanceProcess(const GuidanceConfig& config,
                                  const Clock& clock)
     : impl_(std::make_unique<Impl>(config, machine, participant, clock)) {}
 GuidanceProcess::~GuidanceProcess() = default;
-void GuidanceProcess::Run(std::stop_token stop, const std::function<void()>& on_alive) {
+void GuidanceProcess::Run(const std::stop_token& stop, const std::function<void()>& on_alive) {
   impl_->Run(stop, on_alive);
 }
 void GuidanceProcess::Report(const dds::Alarm& alarm) { impl_->Report(alarm); }

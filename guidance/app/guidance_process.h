@@ -26,7 +26,7 @@ class GuidanceProcess {
   ~GuidanceProcess();
 
   // Until `stop` is asked for. `on_alive` (may be empty) is called with each step.
-  void Run(std::stop_token stop, const std::function<void()>& on_alive = {});
+  void Run(const std::stop_token& stop, const std::function<void()>& on_alive = {});
 
   // What DDS complains of; goes out as an event. From any thread.
   void Report(const dds::Alarm& alarm);

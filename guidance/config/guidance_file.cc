@@ -101,8 +101,8 @@ Result<GuidedMachine, MachineFaults> ParseGuidedMachine(const ReadFile& machine_
     }
   }
   if (!faults.empty()) return Failure{faults};
-  return GuidedMachine{std::move(machine->machine),
-                       std::move(rig->rig),
+  return GuidedMachine{machine->machine,
+                       rig->rig,
                        std::move(axis).value(),
                        machine->sha256,
                        machine_file,

@@ -47,6 +47,7 @@ std::string_view IdlTextOf(std::string_view type) {
   return {};
 }
 
+// NOLINTNEXTLINE(bugprone-macro-parentheses): a type
 #define TBM_CODEC_OF(Message)                                                         \
   template BoundaryFault EncodeCdr<Message>(const Message&, std::vector<std::byte>*); \
   template BoundaryFault DecodeCdr<Message>(std::span<const std::byte>, Message*)
