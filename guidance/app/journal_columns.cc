@@ -34,7 +34,7 @@ std::vector<std::string> TriangleNames(const std::string& what,
   std::vector<std::string> names;
   for (std::size_t i = 0; i < axes.size(); ++i) {
     for (std::size_t j = i; j < axes.size(); ++j) {
-      names.push_back(what + "_" + axes[i] + "_" + axes[j] + unit);
+      names.push_back(fmt::format("{}_{}_{}{}", what, axes[i], axes[j], unit));
     }
   }
   return names;
