@@ -6,6 +6,7 @@
 
 #include "devices/app/station_process.h"
 #include "devices/app/station_state_file.h"
+#include "guidance/core/alarm_command.h"
 #include "pose/base/angle.h"
 #include "pose/base/parse_number.h"
 
@@ -55,8 +56,8 @@ void StationProcess::Obey(const dds::Command& command) {
     Reply(command, kRefused, "it came too late; ask again");
     return;
   }
-  if (verb == "acknowledge") {
-    Acknowledge(command);
+  if (IsAlarmVerb(verb)) {
+    ObeyAlarmVerb(command);
     return;
   }
   ObeyVerb(command, verb);
@@ -102,7 +103,7 @@ void StationProcess::ObeyVerb(const dds::Command& command, const std::string& ve
     Reply(command,
           kRefused,
           "known are set_up, check_references, propose_move, take_over_move, give_up_move, "
-          "undo_move, pause, resume and acknowledge");
+          "undo_move, pause, resume, acknowledge, shelve and unshelve");
   }
 }
 
@@ -160,19 +161,18 @@ void StationProcess::TakeOver(const dds::Command& command,
   Reply(command, kDone, text);
 }
 
-void StationProcess::Acknowledge(const dds::Command& command) {
+void StationProcess::ObeyAlarmVerb(const dds::Command& command) {
   const std::lock_guard lock(mutex_);
-  const auto index = board_.Find(command.argument.view());
-  if (!index) {
-    Reply(command, kRefused, fmt::format("no alarm has the code '{}'", command.argument.view()));
+  const auto order =
+      AlarmOrderOf(board_, command.verb.view(), command.argument.view(), command.because.view());
+  if (!order) {
+    Reply(command, kRefused, order.error());
     return;
   }
-  if (!board_.Acknowledge(*index, clock_.Now())) {
-    Reply(command, kRefused, "there is nothing to acknowledge");
-    return;
-  }
-  acknowledged_by_[*index] = command.by;
-  Reply(command, kDone, "acknowledged");
+  Carry(*order, clock_.Now(), &board_);
+  if (order->verb == AlarmVerb::kAcknowledge) acknowledged_by_[order->rule] = command.by;
+  if (order->verb == AlarmVerb::kShelve) shelved_by_[order->rule] = command;
+  Reply(command, kDone, DoneText(*order));
 }
 
 Result<Station, std::string> StationProcess::RoughStation(std::string_view argument) {

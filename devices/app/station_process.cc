@@ -361,15 +361,21 @@ void StationProcess::SendAlarms(bool all) {
   for (std::size_t i = 0; i < kStationAlarmCount; ++i) {
     board_.Update(i, watched_[i], now);
     const Alarm& alarm = board_.alarm(i);
-    const bool has_changed = alarm.state != told_[i];
+    const bool has_changed = alarm.state != told_[i] || alarm.shelved_until != told_shelf_[i];
     if (!has_changed && !all) continue;
     if (alarm.state == AlarmState::kUnacknowledged) acknowledged_by_[i] = {};
     dds::AlarmStatus message = AlarmOf(names_, board_.rule(i), alarm, details_[i]);
     message.published_at = now;
     message.acknowledged_by = acknowledged_by_[i];
+    if (alarm.shelved_until) {
+      message.shelved_until = *alarm.shelved_until;
+      message.shelved_by = shelved_by_[i].by;
+      message.shelved_because = shelved_by_[i].because;
+    }
     sink_.Publish(message);
     const bool was_active = IsActive(told_[i]);
     told_[i] = alarm.state;
+    told_shelf_[i] = alarm.shelved_until;
     if (IsActive(alarm.state) == was_active) continue;
     Raise(board_.rule(i).code,
           board_.rule(i).priority == AlarmPriority::kLow ? dds::Severity::kWarning

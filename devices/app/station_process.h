@@ -59,7 +59,7 @@ class StationProcess {
   bool TakeInbox();
   void Obey(const dds::Command& command);
   void ObeyVerb(const dds::Command& command, const std::string& verb);
-  void Acknowledge(const dds::Command& command);
+  void ObeyAlarmVerb(const dds::Command& command);
   void TakeOver(const dds::Command& command,
                 Result<KeptStation, std::string> changed,
                 bool is_move);
@@ -116,8 +116,10 @@ class StationProcess {
   std::array<std::optional<double>, kStationAlarmCount> watched_;
   std::array<std::string, kStationAlarmCount> details_;
   std::array<AlarmState, kStationAlarmCount> told_{};
+  std::array<std::optional<Timestamp>, kStationAlarmCount> told_shelf_{};
   std::array<dds::BoundedText<32>, kStationAlarmCount> acknowledged_by_;
-  std::map<std::string, dds::StationSetUp> set_ups_;  // by role, as last concluded
+  std::array<dds::Command, kStationAlarmCount> shelved_by_;  // of meaning while it is shelved
+  std::map<std::string, dds::StationSetUp> set_ups_;         // by role, as last concluded
   std::map<std::string, dds::StationSetUp> told_set_ups_;
   dds::DeviceHealth health_;
   std::uint64_t observations_ = 0;

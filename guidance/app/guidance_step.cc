@@ -1,7 +1,5 @@
 #include "guidance/app/guidance_step.h"
 
-#include <fmt/format.h>
-
 namespace tbm {
 namespace {
 
@@ -58,8 +56,7 @@ const GuidanceStep::Output& GuidanceStep::Step(Timestamp now) {
   output_.alarms.clear();
   output_.events.clear();
   output_.replies.clear();
-  for (const dds::Command& command : commands_) Obey(command, now);
-  commands_.clear();
+  ObeyAll(now);
   const Snapshot& snapshot = core_.Advance(inputs_, now);
   inputs_.clear();
   ++step_number_;
@@ -82,12 +79,17 @@ void GuidanceStep::ListAlarms(Timestamp now) {
   for (std::size_t i = 0; i < kGuidanceAlarmCount; ++i) {
     const Alarm& alarm = core_.alarms().alarm(i);
     const GuidanceAlarmRule& rule = core_.alarm_rules()[i];
-    const bool changed = alarm.state != told_[i];
+    const bool changed = alarm.state != told_[i] || alarm.shelved_until != told_shelf_[i];
     if (!changed && !all) continue;
     if (alarm.state == AlarmState::kUnacknowledged) acknowledged_by_[i] = {};
     dds::AlarmStatus status = AlarmMessageOf(rule, alarm, names_);
     status.published_at = now;
     status.acknowledged_by = acknowledged_by_[i];
+    if (alarm.shelved_until) {
+      status.shelved_until = *alarm.shelved_until;
+      status.shelved_by = shelved_by_[i].by;
+      status.shelved_because = shelved_by_[i].because;
+    }
     output_.alarms.push_back(status);
     if (IsActive(alarm.state) != IsActive(told_[i])) {
       dds::Event event;
@@ -102,27 +104,33 @@ void GuidanceStep::ListAlarms(Timestamp now) {
       output_.events.push_back(event);
     }
     told_[i] = alarm.state;
+    told_shelf_[i] = alarm.shelved_until;
   }
 }
 
-void GuidanceStep::Obey(const dds::Command& command, Timestamp now) {
+// The core carries the orders out with its other inputs. A command is judged on a board on which
+// the ones before it are carried out already.
+void GuidanceStep::ObeyAll(Timestamp now) {
+  if (commands_.empty()) return;
+  AlarmBoard board = core_.alarms();
+  for (const dds::Command& command : commands_) Obey(command, now, &board);
+  commands_.clear();
+}
+
+void GuidanceStep::Obey(const dds::Command& command, Timestamp now, AlarmBoard* board) {
   using enum dds::CommandOutcome;
   if (now > command.expires_at) return Reply(command, kRefused, "it came too late", now);
-  if (command.verb.view() != "acknowledge") {
-    return Reply(command, kRefused, "the guidance knows the verb acknowledge, with a code", now);
+  const std::string_view verb = command.verb.view();
+  if (!IsAlarmVerb(verb)) {
+    return Reply(command, kRefused, "the guidance knows acknowledge, shelve and unshelve", now);
   }
-  const auto rule = core_.alarms().Find(command.argument.view());
-  if (!rule) {
-    return Reply(
-        command, kRefused, fmt::format("no alarm has the code '{}'", command.argument.view()), now);
-  }
-  const AlarmState state = core_.alarms().alarm(*rule).state;
-  if (state != AlarmState::kUnacknowledged && state != AlarmState::kReturnedUnacknowledged) {
-    return Reply(command, kRefused, "there is nothing to acknowledge", now);
-  }
-  inputs_.push_back(AlarmAnswered{*rule});
-  acknowledged_by_[*rule] = command.by;
-  Reply(command, kDone, "acknowledged", now);
+  const auto order = AlarmOrderOf(*board, verb, command.argument.view(), command.because.view());
+  if (!order) return Reply(command, kRefused, order.error(), now);
+  Carry(*order, now, board);
+  inputs_.push_back(*order);
+  if (order->verb == AlarmVerb::kAcknowledge) acknowledged_by_[order->rule] = command.by;
+  if (order->verb == AlarmVerb::kShelve) shelved_by_[order->rule] = command;
+  Reply(command, kDone, DoneText(*order), now);
 }
 
 void GuidanceStep::Reply(const dds::Command& command,

@@ -48,7 +48,8 @@ class GuidanceStep {
   const Machine& machine() const { return machine_; }
 
  private:
-  void Obey(const dds::Command& command, Timestamp now);
+  void ObeyAll(Timestamp now);
+  void Obey(const dds::Command& command, Timestamp now, AlarmBoard* board);
   void Reply(const dds::Command& command,
              dds::CommandOutcome outcome,
              const std::string& text,
@@ -61,7 +62,9 @@ class GuidanceStep {
   std::vector<GuidanceInput> inputs_;
   std::vector<dds::Command> commands_;
   std::array<AlarmState, kGuidanceAlarmCount> told_{};
+  std::array<std::optional<Timestamp>, kGuidanceAlarmCount> told_shelf_{};
   std::array<dds::BoundedText<32>, kGuidanceAlarmCount> acknowledged_by_{};
+  std::array<dds::Command, kGuidanceAlarmCount> shelved_by_{};  // of meaning while it is shelved
   std::optional<Timestamp> all_told_at_;
   std::uint64_t step_number_ = 0;
   std::uint64_t event_number_ = 0;

@@ -366,6 +366,9 @@ void AddCells(JournalRow& row, const dds::AlarmStatus& m) {
   row.Text("cause", m.cause);
   row.Text("response", m.response);
   row.Text("acknowledged_by", m.acknowledged_by);
+  row.Time("shelved_until_utc_ns", m.shelved_until);
+  row.Text("shelved_by", m.shelved_by);
+  row.Text("shelved_because", m.shelved_because);
 }
 
 void AddCells(JournalRow& row, const dds::Command& m) {

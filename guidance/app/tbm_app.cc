@@ -129,7 +129,8 @@ constexpr const char* kStudyHelp =
 
 constexpr const char* kAskHelp =
     "The process answers: accepted (it takes a while), done, refused or failed, with a sentence.\n"
-    "  guidance, total_station   acknowledge CODE\n"
+    "  guidance, total_station   acknowledge CODE, shelve 'CODE MINUTES' --because WHY, "
+    "unshelve CODE\n"
     "  total_station             check_references, set_up, pause, resume, propose_move "
     "E,N,U,REFERENCE,\n"
     "                            take_over_move, give_up_move, undo_move\n"
@@ -138,6 +139,8 @@ constexpr const char* kAskHelp =
     "  tbm ask total_station check_references --by 'A. Surveyor'\n"
     "  tbm ask guidance acknowledge deviation_high --by 'O. Perator' --because 'shift engineer "
     "knows'\n"
+    "  tbm ask guidance shelve 'tilt_late 60' --by 'O. Perator' --because 'cable is being "
+    "changed'\n"
     "\n"
     "Exit codes: 0 done, 2 refused, 3 failed, 4 nobody answers.";
 

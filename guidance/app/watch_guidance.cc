@@ -282,14 +282,23 @@ void GuidanceBoard::Append(const WatchNow& now, std::vector<WatchRow>& rows) con
   AppendSetUps(now, rows);
 }
 
-// What stands unacknowledged first, then by the order in which they came. Silence of the sender
-// takes no alarm away and puts it in no other dress.
+// What stands unacknowledged first, then by the order in which they came; last what is shelved,
+// also while it is normal, so that nobody forgets it. Silence of the sender takes no alarm away and
+// puts it in no other dress, and keeps none on its shelf for longer than was said.
 void GuidanceBoard::AppendAlarms(const WatchNow& now, std::vector<WatchRow>& rows) const {
   std::vector<const WatchHeard<dds::AlarmStatus>*> standing;
+  const auto is_shelved = [&now](const dds::AlarmStatus& alarm) {
+    return now.utc < alarm.shelved_until;
+  };
   for (const auto& [key, heard] : alarms_) {
-    if (heard.message.phase != dds::AlarmPhase::kNormal) standing.push_back(&heard);
+    if (heard.message.phase != dds::AlarmPhase::kNormal || is_shelved(heard.message)) {
+      standing.push_back(&heard);
+    }
   }
-  std::stable_sort(standing.begin(), standing.end(), [](const auto* a, const auto* b) {
+  std::stable_sort(standing.begin(), standing.end(), [&](const auto* a, const auto* b) {
+    const bool a_is_shelved = is_shelved(a->message);
+    const bool b_is_shelved = is_shelved(b->message);
+    if (a_is_shelved != b_is_shelved) return b_is_shelved;
     const bool a_waits = a->message.phase == dds::AlarmPhase::kUnacknowledged;
     const bool b_waits = b->message.phase == dds::AlarmPhase::kUnacknowledged;
     if (a_waits != b_waits) return a_waits;
@@ -297,9 +306,15 @@ void GuidanceBoard::AppendAlarms(const WatchNow& now, std::vector<WatchRow>& row
   });
   for (const auto* heard : standing) {
     const dds::AlarmStatus& alarm = heard->message;
-    const bool stands = alarm.phase != dds::AlarmPhase::kReturnedUnacknowledged;
+    const bool stands = alarm.phase == dds::AlarmPhase::kUnacknowledged ||
+                        alarm.phase == dds::AlarmPhase::kAcknowledged;
     std::string status(watch::PhaseCode(alarm.phase));
     if (!alarm.acknowledged_by.empty()) status += " by " + std::string(alarm.acknowledged_by);
+    if (is_shelved(alarm)) {
+      status += fmt::format(", shelved until {} by {}",
+                            watch::ClockText(alarm.shelved_until),
+                            alarm.shelved_by.view());
+    }
     if (WatchAgeS(heard->received_at, alarm.published_at, now) > watch::kStaleHealthS) {
       status += ", source silent";
     }
@@ -310,14 +325,16 @@ void GuidanceBoard::AppendAlarms(const WatchNow& now, std::vector<WatchRow>& row
     }
     if (stands && !alarm.response.empty()) value += "; " + std::string(alarm.response);
     const bool has_begun = alarm.raised_at.ns >= 0;
+    WatchStyle style = WatchStyle::kDegraded;
+    if (stands && alarm.urgency != dds::AlarmUrgency::kLow) style = WatchStyle::kBad;
+    if (is_shelved(alarm)) style = WatchStyle::kPlain;
     rows.push_back(
         {fmt::format("ALARM {} {}", alarm.source.view(), alarm.code.view()),
          value,
          "",
          has_begun ? AgeText(std::max(0.0, SecondsBetween(alarm.raised_at, now.utc))) : "",
          fmt::format("{} {}", watch::UrgencyCode(alarm.urgency), status),
-         stands && alarm.urgency != dds::AlarmUrgency::kLow ? WatchStyle::kBad
-                                                            : WatchStyle::kDegraded});
+         style});
   }
 }
 

@@ -102,6 +102,10 @@ std::string WatchLine(const dds::AlarmStatus& alarm, double age_s) {
                   watch::UrgencyCode(alarm.urgency));
   if (!alarm.unit.empty()) line += Number("value", alarm.value, 3);
   if (!alarm.acknowledged_by.empty()) line += " by=" + QuotedText(alarm.acknowledged_by);
+  if (alarm.shelved_until != dds::kNever) {
+    line += fmt::format(
+        " shelved_until_ns={} shelved_by={}", alarm.shelved_until.ns, QuotedText(alarm.shelved_by));
+  }
   if (alarm.phase != dds::AlarmPhase::kNormal) line += " cause=" + QuotedText(alarm.cause);
   return line;
 }

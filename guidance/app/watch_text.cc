@@ -32,6 +32,11 @@ std::string AgeText(double age_s) {
   return fmt::format("{:.0f} h", age_s / 3600.0);
 }
 
+std::string ClockText(Timestamp at) {
+  const std::int64_t minutes = at.ns / 60'000'000'000;
+  return fmt::format("{:02}:{:02} UTC", minutes / 60 % 24, minutes % 60);
+}
+
 std::string Mm(double value_m) { return fmt::format("{:10.2f}", value_m * 1e3); }
 
 std::string StatusText(PoseStatus status, PoseReason reason) {

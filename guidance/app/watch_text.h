@@ -13,6 +13,7 @@ extern const double kStalePoseS;
 extern const double kStaleHealthS;
 
 std::string AgeText(double age_s);                             // "0.12 s", "3 min", "2 h"
+std::string ClockText(Timestamp at);                           // "14:05 UTC"
 std::string Mm(double value_m);                                // right-aligned, hundredths
 std::string StatusText(PoseStatus status, PoseReason reason);  // "degraded few_leds"
 

@@ -26,12 +26,16 @@ AlarmBoard::AlarmBoard(std::span<const AlarmRule> rules) {
   }
   alarms_.resize(rules.size());
   asked_since_.resize(rules.size());
+  shelved_at_.resize(rules.size());
 }
 
 bool AlarmBoard::Update(std::size_t index, std::optional<double> value, Timestamp now) {
   const AlarmRule& rule = rules_[index];
   Alarm& alarm = alarms_[index];
   std::optional<Timestamp>& asked_since = asked_since_[index];
+  if (alarm.shelved_until && (now >= *alarm.shelved_until || now < shelved_at_[index])) {
+    alarm.shelved_until.reset();
+  }
   if (!value || !std::isfinite(*value)) {
     asked_since.reset();
     return false;
@@ -72,6 +76,19 @@ bool AlarmBoard::Acknowledge(std::size_t index, Timestamp now) {
     return true;
   }
   return false;
+}
+
+bool AlarmBoard::Shelve(std::size_t index, Timestamp until, Timestamp now) {
+  if (until <= now || until - now > LongestShelf(rules_[index].priority)) return false;
+  alarms_[index].shelved_until = until;
+  shelved_at_[index] = now;
+  return true;
+}
+
+bool AlarmBoard::Unshelve(std::size_t index) {
+  const bool was_shelved = alarms_[index].shelved_until.has_value();
+  alarms_[index].shelved_until.reset();
+  return was_shelved;
 }
 
 std::optional<std::size_t> AlarmBoard::Find(std::string_view code) const {

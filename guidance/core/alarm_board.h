@@ -47,9 +47,15 @@ struct Alarm {
   std::uint64_t raise_number = 0;  // order over all alarms: the lowest standing one came first
   std::uint32_t times_raised = 0;
   std::optional<double> value;  // the last one that was there
+  // Not to be shown or sounded before this; empty: not shelved. It hides the alarm and does nothing
+  // else: state, order and counts go on underneath.
+  std::optional<Timestamp> shelved_until;
 
   bool is_active() const {
     return state == AlarmState::kUnacknowledged || state == AlarmState::kAcknowledged;
+  }
+  bool is_unanswered() const {
+    return state == AlarmState::kUnacknowledged || state == AlarmState::kReturnedUnacknowledged;
   }
 };
 
@@ -58,15 +64,29 @@ class AlarmBoard {
  public:
   static constexpr std::size_t kMostAlarms = 64;
 
+  // A shelf ends by itself: what is put away for longer is a fault of the plant or of the rule, and
+  // is mended there. Nobody puts an urgent alarm away for a whole shift.
+  static constexpr Duration LongestShelf(AlarmPriority priority) {
+    return priority == AlarmPriority::kHigh ? std::chrono::minutes(30) : std::chrono::hours(8);
+  }
+
   // At most kMostAlarms rules with clear_below <= raise_above; anything else is our mistake.
   explicit AlarmBoard(std::span<const AlarmRule> rules);
 
   // Tells the value that rule `index` watches. Without a value (or with one that is no number)
-  // nothing is known: no alarm is raised and none is cleared. True when the state changed.
+  // nothing is known: no alarm is raised and none is cleared. True when the state changed. Also
+  // ends a shelf whose time is over, or that was begun under a clock that has been set back since:
+  // more would remain of it than was asked for.
   bool Update(std::size_t index, std::optional<double> value, Timestamp now);
 
   // True when there was something to acknowledge.
   bool Acknowledge(std::size_t index, Timestamp now);
+
+  // Puts the alarm away, whatever its state, or changes until when it is. False, and nothing has
+  // changed, unless `until` is after `now` by at most LongestShelf.
+  bool Shelve(std::size_t index, Timestamp until, Timestamp now);
+  // True when it was shelved.
+  bool Unshelve(std::size_t index);
 
   std::size_t size() const { return rules_.size(); }
   const AlarmRule& rule(std::size_t index) const { return rules_[index]; }
@@ -75,7 +95,7 @@ class AlarmBoard {
   std::optional<std::size_t> Find(std::string_view code) const;
 
   // Of those that stand (not kNormal) the one that was raised first: most often the cause of the
-  // others.
+  // others. A shelved one too: that nobody looks at it does not make the next one the cause.
   std::optional<std::size_t> FirstOut() const;
 
  private:
@@ -85,6 +105,7 @@ class AlarmBoard {
   FixedVector<Alarm, kMostAlarms> alarms_;
   // Since when the value asks for the other state.
   FixedVector<std::optional<Timestamp>, kMostAlarms> asked_since_;
+  FixedVector<Timestamp, kMostAlarms> shelved_at_;
   std::uint64_t raised_ = 0;
 };
 

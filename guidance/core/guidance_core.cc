@@ -124,9 +124,7 @@ void GuidanceCore::Take(const TiltSeen& seen) {
   mean.Add(seen.sensed_at, *seen.inclination);
 }
 
-void GuidanceCore::Take(const AlarmAnswered& answered) {
-  if (answered.rule < alarms_.size()) alarms_.Acknowledge(answered.rule, *last_now_);
-}
+void GuidanceCore::Take(const AlarmOrder& order) { Carry(order, *last_now_, &alarms_); }
 
 void GuidanceCore::Forget() {
   rear_.Forget();

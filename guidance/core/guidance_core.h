@@ -53,7 +53,7 @@ class GuidanceCore {
   void Take(const SetUpKnown& set_up);
   void Take(const RelativeSeen& seen);
   void Take(const TiltSeen& seen);
-  void Take(const AlarmAnswered& answered);
+  void Take(const AlarmOrder& order);
   void Forget();
   void WatchSources();
   void PlaceRear();

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "guidance/core/alarm_command.h"
 #include "guidance/shield/uncertain.h"
 #include "guidance/station/polar.h"
 #include "pose/base/pose_reason.h"
@@ -52,11 +53,7 @@ struct TiltSeen {
   std::optional<Inclination> inclination;
 };
 
-// Somebody has answered an alarm.
-struct AlarmAnswered {
-  std::size_t rule = 0;  // into the alarm board
-};
-
-using GuidanceInput = std::variant<PrismSeen, SetUpKnown, RelativeSeen, TiltSeen, AlarmAnswered>;
+// AlarmOrder: what somebody asked of an alarm.
+using GuidanceInput = std::variant<PrismSeen, SetUpKnown, RelativeSeen, TiltSeen, AlarmOrder>;
 
 }  // namespace tbm

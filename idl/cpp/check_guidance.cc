@@ -314,7 +314,7 @@ BoundaryFault Check(const v1::Guidance& wire) {
 BoundaryFault Check(const v1::AlarmStatus& wire) {
   if (AnyEmpty(wire.machine_id(), wire.source(), wire.code())) return BoundaryFault::kNoKey;
   if (!IsTime(wire.published_at_utc_ns()) || !IsTimeOrNever(wire.since_utc_ns()) ||
-      !IsTimeOrNever(wire.raised_at_utc_ns())) {
+      !IsTimeOrNever(wire.raised_at_utc_ns()) || !IsTimeOrNever(wire.shelved_until_utc_ns())) {
     return BoundaryFault::kNoTime;
   }
   if (wire.phase() > v1::ALARM_RETURNED_UNACKNOWLEDGED || wire.urgency() > v1::ALARM_HIGH) {
@@ -323,6 +323,10 @@ BoundaryFault Check(const v1::AlarmStatus& wire) {
   if (!AllFinite({wire.raise_above(), wire.clear_below()})) return BoundaryFault::kNotFinite;
   if (std::isinf(wire.value()) || wire.clear_below() > wire.raise_above()) {
     return BoundaryFault::kOutOfRange;
+  }
+  const bool is_shelved = wire.shelved_until_utc_ns() != kNeverNs;
+  if (is_shelved == AnyEmpty(wire.shelved_by()) || is_shelved == AnyEmpty(wire.shelved_because())) {
+    return BoundaryFault::kContradiction;
   }
   const bool was_raised = wire.raised_at_utc_ns() != kNeverNs;
   if (wire.phase() != v1::ALARM_NORMAL && !was_raised) return BoundaryFault::kContradiction;

@@ -264,6 +264,9 @@ void Fields(const Way& way, M& m, W& w) {
   way(m.cause, w.cause());
   way(m.response, w.response());
   way(m.acknowledged_by, w.acknowledged_by());
+  way(m.shelved_until, w.shelved_until_utc_ns());
+  way(m.shelved_by, w.shelved_by());
+  way(m.shelved_because, w.shelved_because());
 }
 
 template <class Way, class M, class W, Only<Command, M> = 0>

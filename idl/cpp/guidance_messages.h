@@ -235,6 +235,9 @@ struct AlarmStatus {
   BoundedText<120> cause;
   BoundedText<160> response;
   BoundedText<32> acknowledged_by;
+  Timestamp shelved_until = kNever;
+  BoundedText<32> shelved_by;
+  BoundedText<120> shelved_because;
 
   bool operator==(const AlarmStatus&) const = default;
 };

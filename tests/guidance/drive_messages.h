@@ -87,7 +87,7 @@ class DriveMessages {
     at_ = seen.sensed_at;
     messages->push_back(m);
   }
-  void Add(const AlarmAnswered&, std::vector<GuidanceMessage>*) {}
+  void Add(const AlarmOrder&, std::vector<GuidanceMessage>*) {}
 
   const Machine& machine_;
   Timestamp at_{1'700'000'000'000'000'000};

@@ -2,7 +2,11 @@
 #include "guidance/app/guidance_process.h"
 
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <mutex>
+#include <set>
+#include <span>
 #include <sstream>
 #include <thread>
 #include <vector>
@@ -12,8 +16,11 @@
 
 #include "guidance/app/ask_command.h"
 #include "guidance/app/replay_command.h"
+#include "guidance/journal/mcap_reader.h"
+#include "idl/cpp/codec.h"
 #include "idl/cpp/publisher.h"
 #include "idl/cpp/subscriber.h"
+#include "idl/cpp/topics.h"
 #include "tests/guidance/drive_messages.h"
 #include "tests/idl/dds_support.h"
 #include "tests/support/temp_folder.h"
@@ -90,6 +97,12 @@ class Listener {
     const std::lock_guard lock(mutex_);
     return alarms_;
   }
+  std::string ShelvedBy(std::string_view code) {
+    for (const dds::AlarmStatus& alarm : alarms()) {
+      if (alarm.code.view() == code) return std::string(alarm.shelved_by);
+    }
+    return {};
+  }
 
  private:
   std::mutex mutex_;
@@ -114,6 +127,25 @@ class Listener {
         alarms_.push_back(m);
       }};
 };
+
+// Whom the commands in the journal were addressed to.
+std::set<std::string> AddresseesIn(const std::string& folder) {
+  std::set<std::string> addressees;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    std::ifstream file(entry.path(), std::ios::binary);
+    const std::string content((std::istreambuf_iterator<char>(file)), {});
+    const auto read =
+        ReadMcap(std::as_bytes(std::span(content)),
+                 [&](const McapChannel& channel, const McapMessage& message) {
+                   if (channel.topic != dds::kCommandTopic.name) return;
+                   dds::Command command;
+                   EXPECT_EQ(dds::DecodeCdr(message.data, &command), dds::BoundaryFault::kNone);
+                   addressees.emplace(command.addressee);
+                 });
+    EXPECT_TRUE(read) << entry.path();
+  }
+  return addressees;
+}
 
 TEST(GuidanceProcess, GuidesFromItsNeighboursTopicsAndItsJournalReplaysBitForBit) {
   const GuidedMachine machine = ExampleMachine();
@@ -153,6 +185,12 @@ TEST(GuidanceProcess, GuidesFromItsNeighboursTopicsAndItsJournalReplaysBitForBit
     EXPECT_EQ(answer.str(), "guidance: done: acknowledged\n");
     EXPECT_EQ(RunAsk(ask, {answer, answer}), ExitCode::kBadInput);  // once is enough
     EXPECT_THAT(answer.str(), testing::HasSubstr("guidance: refused: there is nothing"));
+    ask.verb = "shelve";
+    ask.argument = "camera_late 60";
+    EXPECT_EQ(RunAsk(ask, {answer, answer}), ExitCode::kBadInput) << "without a reason";
+    ask.because = "the camera is being cleaned";
+    EXPECT_EQ(RunAsk(ask, {answer, answer}), ExitCode::kDone) << answer.str();
+    EXPECT_TRUE(Eventually([&] { return listener.ShelvedBy("camera_late") == "O. Perator"; }));
     ask.addressee = "nobody";
     ask.wait_s = 0.5;
     EXPECT_EQ(RunAsk(ask, {answer, answer}), ExitCode::kDds);
@@ -194,6 +232,8 @@ TEST(GuidanceProcess, GuidesFromItsNeighboursTopicsAndItsJournalReplaysBitForBit
     EXPECT_EQ(listener.last().reason.view(), "camera_coasting");
     steps = listener.last().sample_number;
   }
+  EXPECT_THAT(AddresseesIn(config.journal_folder), testing::IsSupersetOf({"guidance", "nobody"}))
+      << "also what others were asked to do";
   std::ostringstream out;
   std::ostringstream err;
   EXPECT_EQ(RunReplay({{config.journal_folder}, {}}, {out, err}), ExitCode::kDone)

@@ -180,6 +180,54 @@ TEST_F(Step, AnAlarmIsToldOnceAnsweredByNameAndRefusedWhenThereIsNone) {
   EXPECT_TRUE(step_.Step(lost + seconds(7)).replies.empty());
 }
 
+TEST_F(Step, AShelvedAlarmSaysUntilWhenByWhomAndWhyAndGoesOnUnderneath) {
+  DriveTo(2100.0);
+  const Timestamp at = drive_.now();
+  const auto ask = [&](std::string_view verb, std::string_view argument, Timestamp now) {
+    dds::Command command = Acknowledge(argument, now);
+    command.verb = verb;
+    command.because = "the camera is being cleaned";
+    step_.Take(command);
+  };
+  const auto told = [](const GuidanceStep::Output& said) {
+    std::optional<dds::AlarmStatus> alarm;
+    for (const dds::AlarmStatus& one : said.alarms) {
+      if (one.code.view() == "position_lost") alarm = one;
+    }
+    return alarm;
+  };
+  // The second is judged after the first, within one step.
+  ask("unshelve", "position_lost", at);
+  ask("shelve", "position_lost 10", at);
+  ask("unshelve", "position_lost", at);
+  ask("shelve", "position_lost 20", at);
+  ask("shelve", "position_lost 31", at);
+  const GuidanceStep::Output& shelved = step_.Step(at + std::chrono::milliseconds(100));
+  using enum dds::CommandOutcome;
+  std::vector<dds::CommandOutcome> outcomes;
+  for (const dds::CommandReply& reply : shelved.replies) outcomes.push_back(reply.outcome);
+  EXPECT_EQ(outcomes, (std::vector{kRefused, kDone, kDone, kDone, kRefused}));
+  ASSERT_TRUE(told(shelved)) << "at the change";
+  const Timestamp until = at + std::chrono::milliseconds(100) + std::chrono::minutes(20);
+  EXPECT_EQ(told(shelved)->shelved_until, until);
+  EXPECT_EQ(told(shelved)->shelved_by.view(), "O. Perator");
+  EXPECT_EQ(told(shelved)->shelved_because.view(), "the camera is being cleaned");
+  std::vector<std::byte> bytes;
+  EXPECT_EQ(dds::EncodeCdr(*told(shelved), &bytes), dds::BoundaryFault::kNone);
+  // Nothing came for ten minutes.
+  step_.Step(at + seconds(600));
+  const GuidanceStep::Output& raised = step_.Step(at + seconds(603));
+  EXPECT_EQ(told(raised)->phase, dds::AlarmPhase::kUnacknowledged);
+  EXPECT_EQ(told(raised)->shelved_until, until);
+  EXPECT_FALSE(raised.events.empty());
+  step_.Step(until - std::chrono::milliseconds(1));
+  const GuidanceStep::Output& over = step_.Step(until);
+  ASSERT_TRUE(told(over)) << "at the change";
+  EXPECT_EQ(told(over)->shelved_until, dds::kNever);
+  EXPECT_TRUE(told(over)->shelved_by.empty() && told(over)->shelved_because.empty());
+  EXPECT_EQ(told(over)->phase, dds::AlarmPhase::kUnacknowledged);
+}
+
 // A journal as the process writes it: files, then for each step its inputs, the step, what it said.
 class JournalOfAShift : public Step {
  protected:
@@ -278,6 +326,25 @@ TEST_F(JournalOfAShift, ReplaysBitForBit) {
   const std::string text = Replay(ExitCode::kDone);
   EXPECT_THAT(text, HasSubstr("1 starts of the guidance, 120 steps taken again"));
   EXPECT_THAT(text, HasSubstr("bit for bit"));
+}
+
+TEST_F(JournalOfAShift, ReplaysAShelfUntilItEndsByItself) {
+  const auto shelve = [&](std::string_view verb, std::string_view argument) {
+    drive_.Measure(chainage_m_ += 1.5);
+    std::vector<GuidanceMessage> inputs = messages_.From(drive_.inputs());
+    dds::Command command = Acknowledge(argument, drive_.now());
+    command.verb = verb;
+    command.because = "the cable is being changed";
+    inputs.push_back(command);
+    AddStep(inputs, drive_.now());
+  };
+  const Timestamp began = drive_.now();
+  shelve("shelve", "tilt_late 1");
+  shelve("shelve", "roll_high 30");
+  DriveOn(5);
+  shelve("unshelve", "roll_high");
+  while (drive_.now() - began < std::chrono::minutes(2)) DriveOn(1);
+  EXPECT_THAT(Replay(ExitCode::kDone), HasSubstr("bit for bit"));
 }
 
 TEST_F(JournalOfAShift, ReplaysARestartOfTheProcess) {

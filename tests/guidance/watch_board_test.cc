@@ -373,6 +373,46 @@ TEST(WatchBoard, AlarmsSayCauseAndWhatToDoAndOutliveTheirSender) {
             "high acknowledged by m.weber");
 }
 
+TEST(WatchBoard, AShelvedAlarmStandsLastInPlainDressUntilItsTime) {
+  WatchBoard board;
+  dds::AlarmStatus alarm;
+  alarm.machine_id = "tbm7";
+  alarm.source = "guidance";
+  alarm.code = "camera_late";
+  alarm.published_at = kUtc;
+  alarm.cause = "no pose from the camera box";
+  alarm.shelved_until = kUtc + std::chrono::minutes(20);  // kUtc is 14:13:20
+  alarm.shelved_by = "m.weber";
+  alarm.shelved_because = "the camera is being cleaned";
+  board.Add(alarm, kSteady);
+  const std::string name = "ALARM guidance camera_late";
+  EXPECT_EQ(RowOf(board, NowAfter({}), name).status,
+            "medium normal, shelved until 14:33 UTC by m.weber");
+  alarm.phase = dds::AlarmPhase::kUnacknowledged;
+  alarm.raised_at = kUtc;
+  alarm.raise_number = 1;
+  board.Add(alarm, kSteady);
+  dds::AlarmStatus other = alarm;
+  other.code = "roll_high";
+  other.phase = dds::AlarmPhase::kAcknowledged;
+  other.raise_number = 2;
+  other.shelved_until = dds::kNever;
+  other.shelved_by = {};
+  other.shelved_because = {};
+  board.Add(other, kSteady);
+  const auto rows = board.Rows(NowAfter({}));
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_EQ(rows[1].what, "ALARM guidance roll_high");
+  EXPECT_EQ(rows[2].what, name);
+  EXPECT_EQ(rows[2].style, WatchStyle::kPlain);
+  EXPECT_THAT(WatchLine(alarm, 0.1), HasSubstr(" shelved_until_ns=1790001200000000000 "));
+  EXPECT_THAT(WatchLine(alarm, 0.1), HasSubstr(" shelved_by=\"m.weber\""));
+  // Nothing was heard since: it ends all the same.
+  const WatchRow over = RowOf(board, NowAfter(std::chrono::minutes(20)), name);
+  EXPECT_EQ(over.status, "medium unacknowledged, source silent");
+  EXPECT_EQ(over.style, WatchStyle::kBad);
+}
+
 TEST(WatchBoard, AShieldAndASetUpShowTheirNumbers) {
   WatchBoard board;
   dds::ShieldPose shield;

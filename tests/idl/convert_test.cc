@@ -298,6 +298,10 @@ TEST(Boundary, RefusesAlarmsAndCommandsThatBreakTheContract) {
   EXPECT_EQ(a([](A& x) { x.times_raised(0); }), BoundaryFault::kContradiction);
   EXPECT_EQ(a([](A& x) { x.clear_below(60.0); }), BoundaryFault::kOutOfRange);
   EXPECT_EQ(a([](A& x) { x.raise_above(kNaN); }), BoundaryFault::kNotFinite);
+  EXPECT_EQ(a([](A& x) { x.shelved_until_utc_ns(0); }), BoundaryFault::kNoTime);
+  EXPECT_EQ(a([](A& x) { x.shelved_until_utc_ns(-1); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(a([](A& x) { x.shelved_by(""); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(a([](A& x) { x.shelved_because(""); }), BoundaryFault::kContradiction);
   EXPECT_EQ(a([](A& x) { x.value(kNaN); }), BoundaryFault::kNone);  // not known
   EXPECT_EQ(c([](C& x) { x.request_id(""); }), BoundaryFault::kNoKey);
   EXPECT_EQ(c([](C& x) { x.by(""); }), BoundaryFault::kNoKey);

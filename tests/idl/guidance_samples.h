@@ -199,6 +199,9 @@ inline AlarmStatus FullAlarmStatus() {
   m.cause = "the cutter face is further from the design axis than allowed";
   m.response = "steer back in small steps; tell the shift engineer";
   m.acknowledged_by = "O. Perator";
+  m.shelved_until.ns = 1'700'000'000'000'000'505;
+  m.shelved_by = "F. Oreman";
+  m.shelved_because = "the cover of a prism is being changed";
   return m;
 }
 

@@ -157,7 +157,7 @@ class StationBench : public testing::Test {
   }
   bool IsGood() const { return process_->keeper().health() == SetUpHealth::kGood; }
 
-  void Send(std::string_view verb, std::string_view argument = {}) {
+  void Send(std::string_view verb, std::string_view argument, std::string_view because) {
     dds::Command command;
     command.machine_id = "TBM-1";
     last_request_ = "request-" + std::to_string(++requests_);
@@ -166,6 +166,7 @@ class StationBench : public testing::Test {
     command.verb = verb;
     command.argument = argument;
     command.by = "surveyor";
+    command.because = because;
     command.issued_at = clock_.Now();
     command.expires_at = clock_.Now() + std::chrono::minutes(5);
     process_->Hear(command);
@@ -178,8 +179,10 @@ class StationBench : public testing::Test {
     }
     return last;
   }
-  std::optional<dds::CommandOutcome> Ask(std::string_view verb, std::string_view argument = {}) {
-    Send(verb, argument);
+  std::optional<dds::CommandOutcome> Ask(std::string_view verb,
+                                         std::string_view argument = {},
+                                         std::string_view because = {}) {
+    Send(verb, argument, because);
     RunUntil(
         [&] {
           const auto answer = Answer();

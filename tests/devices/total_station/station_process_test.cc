@@ -168,6 +168,36 @@ TEST_F(StationRuns, AlarmsSayWhatIsWrong) {
   EXPECT_TRUE(RunUntil([&] { return !sink_.IsRaised("station_tilted"); }, 4min));
 }
 
+TEST_F(StationRuns, AnAlarmIsShelvedForAWhile) {
+  Start();
+  ASSERT_TRUE(BecomesGood());
+  EXPECT_EQ(Ask("shelve", "prism_not_found 5"), CommandOutcome::kRefused);
+  EXPECT_THAT(std::string(Answer()->text.view()), HasSubstr("say why"));
+  EXPECT_EQ(Ask("shelve", "station_silent 31", "radio"), CommandOutcome::kRefused);
+  EXPECT_EQ(Ask("unshelve", "prism_not_found"), CommandOutcome::kRefused);
+  EXPECT_EQ(Ask("shelve", "prism_not_found 10", "segment crane"), CommandOutcome::kDone);
+  EXPECT_EQ(Ask("shelve", "low_power 480", "no spare"), CommandOutcome::kDone);
+  const Timestamp until = sink_.Alarm("prism_not_found")->shelved_until;
+  EXPECT_NEAR(SecondsBetween(clock_.Now(), until), 600.0, 60.0);
+  EXPECT_EQ(sink_.Alarm("prism_not_found")->shelved_by.view(), "surveyor");
+  EXPECT_EQ(sink_.Alarm("prism_not_found")->shelved_because.view(), "segment crane");
+  hidden_ = "right";
+  ASSERT_TRUE(RunUntil([&] { return sink_.IsRaised("prism_not_found"); }, 4min));
+  EXPECT_EQ(sink_.Alarm("prism_not_found")->shelved_until, until);
+  const auto is_over = [&] { return sink_.Alarm("prism_not_found")->shelved_until == dds::kNever; };
+  ASSERT_TRUE(RunUntil(is_over, 11min));
+  EXPECT_LT(SecondsBetween(until, clock_.Now()), 30.0);
+  EXPECT_TRUE(sink_.IsRaised("prism_not_found"));
+  EXPECT_TRUE(sink_.Alarm("prism_not_found")->shelved_by.empty());
+  EXPECT_EQ(Ask("unshelve", "low_power"), CommandOutcome::kDone);
+  EXPECT_EQ(sink_.Alarm("low_power")->shelved_until, dds::kNever);
+  // A restart brings every alarm back.
+  EXPECT_EQ(Ask("shelve", "low_power 480", "no spare"), CommandOutcome::kDone);
+  StartProcess();
+  Run(2s);
+  EXPECT_EQ(sink_.Alarm("low_power")->shelved_until, dds::kNever);
+}
+
 TEST_F(StationRuns, ASilentInstrumentIsAlarmedAndCheckedWhenItIsBack) {
   Start();
   ASSERT_TRUE(BecomesGood());

@@ -127,6 +127,57 @@ TEST(AlarmBoard, AClockSetBackStartsTheDelayAnew) {
   EXPECT_TRUE(board.Update(0, 0.040, At(12)));
 }
 
+TEST(AlarmBoard, AShelfHidesAndNothingElse) {
+  Board board;
+  EXPECT_TRUE(board.Shelve(0, At(600), At(0)));
+  board.Raise();
+  EXPECT_TRUE(board.Update(1, 1.0, At(3)));
+  EXPECT_EQ(board.state(), AlarmState::kUnacknowledged);
+  EXPECT_EQ(board.alarm(0).times_raised, 1u);
+  EXPECT_EQ(board.alarm(0).shelved_until, At(600));
+  EXPECT_EQ(board.FirstOut(), 0u) << "hidden, and still the first";
+  EXPECT_TRUE(board.Acknowledge(0, At(5)));
+  EXPECT_EQ(board.state(), AlarmState::kAcknowledged);
+  EXPECT_EQ(board.alarm(0).shelved_until, At(600));
+}
+
+TEST(AlarmBoard, AShelfEndsAtItsTimeWhateverIsKnown) {
+  Board board;
+  EXPECT_TRUE(board.Shelve(0, At(600), At(0)));
+  (void)board.Update(0, {}, At(599.9));
+  EXPECT_TRUE(board.alarm(0).shelved_until);
+  EXPECT_FALSE(board.Update(0, {}, At(600))) << "the state is as it was";
+  EXPECT_FALSE(board.alarm(0).shelved_until);
+}
+
+TEST(AlarmBoard, AShelfEndsByHandAndByAClockSetBack) {
+  Board board;
+  EXPECT_FALSE(board.Unshelve(0));
+  EXPECT_TRUE(board.Shelve(0, At(2000), At(1000)));
+  EXPECT_TRUE(board.Shelve(0, At(1500), At(1100))) << "another time";
+  EXPECT_EQ(board.alarm(0).shelved_until, At(1500));
+  (void)board.Update(0, 0.0, At(1100));
+  EXPECT_TRUE(board.alarm(0).shelved_until);
+  EXPECT_TRUE(board.Unshelve(0));
+  EXPECT_FALSE(board.alarm(0).shelved_until);
+  EXPECT_TRUE(board.Shelve(0, At(2000), At(1000)));
+  (void)board.Update(0, 0.0, At(999));
+  EXPECT_FALSE(board.alarm(0).shelved_until) << "more would remain than was asked for";
+}
+
+TEST(AlarmBoard, NoShelfIsForeverAndAnUrgentOnesIsShort) {
+  Board board;
+  for (const double until : {-1.0, 0.0, 1.0}) {
+    EXPECT_FALSE(board.Shelve(1, At(until), At(1))) << until;
+  }
+  EXPECT_FALSE(board.Shelve(0, At(1801), At(0)));
+  EXPECT_TRUE(board.Shelve(0, At(1800), At(0)));
+  EXPECT_FALSE(board.Shelve(1, At(8 * 3600 + 1), At(0)));
+  EXPECT_TRUE(board.Shelve(1, At(8 * 3600), At(0)));
+  EXPECT_FALSE(board.Shelve(0, At(5000), At(1)));
+  EXPECT_EQ(board.alarm(0).shelved_until, At(1800)) << "refused, nothing has changed";
+}
+
 TEST(AlarmBoard, IsFoundByItsCode) {
   const Board board;
   EXPECT_EQ(board.Find("prism_lost"), 1u);

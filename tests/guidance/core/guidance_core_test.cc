@@ -87,7 +87,7 @@ class Core : public testing::Test {
     return core_.alarms().alarm(static_cast<std::size_t>(alarm)).state;
   }
   void Answer(GuidanceAlarm alarm, Timestamp now) {
-    core_.Advance(std::vector<GuidanceInput>{AlarmAnswered{static_cast<std::size_t>(alarm)}}, now);
+    core_.Advance(std::vector<GuidanceInput>{AlarmOrder{static_cast<std::size_t>(alarm)}}, now);
   }
 
   Drive drive_;
@@ -507,7 +507,7 @@ TEST_F(Core, AnAlarmIsRaisedAnsweredAndClearedWithHysteresis) {
   EXPECT_EQ(state(), AlarmState::kNormal);  // not yet for long enough
   core.Advance(Later(live, seconds(3)), at_ + seconds(3));
   EXPECT_EQ(state(), AlarmState::kUnacknowledged);
-  core.Advance(std::vector<GuidanceInput>{AlarmAnswered{0}}, at_ + seconds(3));
+  core.Advance(std::vector<GuidanceInput>{AlarmOrder{0}}, at_ + seconds(3));
   EXPECT_EQ(state(), AlarmState::kAcknowledged);
   // The camera fails for good: nothing is known, so nothing is cleared.
   for (int s = 4; s < 400; ++s) core.Advance({}, at_ + seconds(s));

@@ -146,6 +146,8 @@ EXPECTED = {
         "raise_above": 50.0, "clear_below": 45.0, "unit": "mm",
         "cause": "the cutter face is further from the design axis than allowed",
         "response": "steer back in small steps; tell the shift engineer", "acknowledged_by": "O. Perator",
+        "shelved_until_utc_ns": T + 505, "shelved_by": "F. Oreman",
+        "shelved_because": "the cover of a prism is being changed",
     },
     "command": {
         "machine_id": "machine-17", "request_id": "6f9619ff-8b86-d011-b42d-00c04fc964ff",
