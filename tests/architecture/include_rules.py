@@ -44,11 +44,15 @@ ALLOWED = {
     "guidance/core": {"Eigen", *POSE, "guidance/axis", "guidance/station", "guidance/shield"},
     "guidance/journal": {"pose/base", "zlib.h"},
     "guidance/config": {"Eigen", "pose/base", "pose/rig", "guidance/axis", "guidance/core/machine.h", "devices/replay/csv.h", "yaml-cpp", "fmt", "pugixml.hpp", "openssl"},
+    "hmi_bridge/core": {"Eigen", *POSE, "guidance/axis", "guidance/core", "guidance/shield", "idl/cpp/messages.h", "idl/cpp/guidance_messages.h",
+                        "idl/cpp/alarm.h", "idl/cpp/bounded_text.h", "idl/cpp/words.h", "hmi_bridge/server/console_source.h", "nlohmann", "fmt"},
+    "hmi_bridge/app": {"Eigen", *POSE_ALL, "pose/app/service_manager.h", "devices/app/end_signals.h", "guidance/axis", "guidance/config", "guidance/core",
+                       "guidance/app/exit_code.h", "idl/cpp", "hmi_bridge", "nlohmann", "fmt", "CLI", "yaml-cpp", *POSIX},
     "idl/cpp": {"Eigen", *POSE_ALL, "fastdds", "fastrtps", "fastcdr", "tbm_idl", "fmt", *POSIX},
 }
 # Folders that compute and do nothing else, and the standard headers that would betray them.
 PURE = {"pose/base", "pose/geometry", "pose/centres", "pose/solve", "pose/frame", "guidance/axis", "guidance/station", "guidance/shield", "guidance/core",
-        "guidance/journal"}
+        "guidance/journal", "hmi_bridge/core"}
 EFFECTS = {"condition_variable", "filesystem", "fstream", "future", "iostream", "mutex", "thread", "ctime", "random"}
 # One file alone may know a library that its folder may not.
 ONLY_IN = {"ceres": {"pose/solve/penalty_pose.cc"},
@@ -58,7 +62,7 @@ ONLY_IN = {"ceres": {"pose/solve/penalty_pose.cc"},
            "arv.h": {"devices/camera", "devices/app"},
            "boost": {"devices/total_station/asio_link.cc"},
            "pugixml.hpp": {"guidance/config"},
-           "yaml-cpp": {"pose/rig", "pose/app", "guidance/config", "devices/app"}}
+           "yaml-cpp": {"pose/rig", "pose/app", "guidance/config", "devices/app", "hmi_bridge/app"}}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
 
