@@ -93,6 +93,10 @@ const Snapshot& GuidanceCore::Advance(std::span<const GuidanceInput> inputs, Tim
   for (const GuidanceInput& input : inputs) {
     std::visit([this](const auto& one) { Take(one); }, input);
   }
+  if (rear_.quarantines() != quarantines_) {
+    quarantines_ = rear_.quarantines();
+    front_then_.reset();
+  }
   snapshot_.at = now;
   WatchSources();
   const bool has_exposure = snapshot_.camera.freshness == Freshness::kFresh;
@@ -171,7 +175,7 @@ void GuidanceCore::PlaceRear() {
   if (fix->exchanged) reason = GuidanceReason::kPrismsExchanged;
   if (fix->left_out) reason = GuidanceReason::kPrismLeftOut;
   if (rear_.IsSuspect()) reason = GuidanceReason::kSetUpSuspect;
-  snapshot_.rear = Stated(RearNow(*fix), *station.age_s, reason);
+  snapshot_.rear = Stated(RearAt(*fix, snapshot_.valid_at), *station.age_s, reason);
   snapshot_.rear.speed_m_per_s = fix->speed_m_per_s;
   snapshot_.rear.speed_sigma_m_per_s = fix->speed_sigma_m_per_s;
 }
@@ -179,14 +183,14 @@ void GuidanceCore::PlaceRear() {
 // The last fix, grown old by the coasting law; pulled after the front shield by what the joint has
 // closed since, going about where it points. Where nobody watches the joint, a regrip may have
 // taken place at any time.
-UncertainRigid3 GuidanceCore::RearNow(const RearShieldFix& fix) const {
-  const double age_s = std::max(SecondsBetween(fix.at, snapshot_.valid_at), 0.0);
+UncertainRigid3 GuidanceCore::RearAt(const RearShieldFix& fix, Timestamp when) const {
+  const double age_s = std::max(SecondsBetween(fix.at, when), 0.0);
   UncertainRigid3 now = Coasted({fix.site_from_rear_shield, fix.covariance},
                                 fix.speed_m_per_s,
                                 fix.speed_sigma_m_per_s,
                                 age_s,
                                 machine_.coast);
-  const std::optional<double> closed_m = joint_.Between(fix.at, snapshot_.valid_at);
+  const std::optional<double> closed_m = joint_.Between(fix.at, when);
   const Eigen::Matrix3d turned = now.b_from_a.rotation.toRotationMatrix();
   Eigen::Vector3d sigma_m(std::min(kRegrip_m_per_s * age_s, kLongestStroke_m), 0.0, 0.0);
   double turn_rad2 = 0.0;
@@ -233,28 +237,48 @@ void GuidanceCore::PlaceFront() {
       snapshot_.front = Without(snapshot_.rear.reason);
       return;
     }
-    RearShieldFix rear = *rear_.fix();
-    rear.site_from_rear_shield = snapshot_.rear.site_from_shield.b_from_a;
-    rear.covariance = snapshot_.rear.site_from_shield.covariance;
-    front_then_ = FrontShieldInSite(rear, rig_, machine_.geometry, RelativeWithTilts());
+    PlaceFrontThen(*rear_.fix());
     GuidanceReason reason = snapshot_.rear.reason;
     if (reason == GuidanceReason::kNone && relative_->status == PoseStatus::kDegraded) {
       reason = GuidanceReason::kCameraDegraded;
     }
     snapshot_.front = Stated(*front_then_, std::max(*camera.age_s, snapshot_.rear.age_s), reason);
   } else {
-    // The front shield coasts by itself from where it was seen last, whatever the rear one does.
-    if (!front_then_) {
-      snapshot_.front =
-          Without(snapshot_.rear.worth == Worth::kInvalid ? snapshot_.rear.reason
-                                                          : GuidanceReason::kCameraStale);
-      return;
-    }
-    const double age_s = std::max(SecondsBetween(relative_->sensed_at, snapshot_.at), 0.0);
-    snapshot_.front = Stated(Coasted(*front_then_, 0.0, 0.0, age_s, machine_.coast),
-                             std::max(age_s, snapshot_.station.age_s.value_or(age_s)),
-                             GuidanceReason::kCameraCoasting);
+    CoastFront();
   }
+}
+
+// The front shield at the last relative pose, on the rear shield as this fix puts it there.
+void GuidanceCore::PlaceFrontThen(const RearShieldFix& fix) {
+  const UncertainRigid3 site_from_rear = RearAt(fix, relative_->sensed_at);
+  RearShieldFix rear = fix;
+  rear.site_from_rear_shield = site_from_rear.b_from_a;
+  rear.covariance = site_from_rear.covariance;
+  front_then_ = FrontShieldInSite(rear, rig_, machine_.geometry, RelativeWithTilts());
+  front_rests_on_ = fix.at;
+}
+
+// The front shield coasts by itself from where it was seen last, whatever the rear one does.
+void GuidanceCore::CoastFront() {
+  const RearShieldFix* fix = rear_.fix();
+  if (!front_then_ && fix != nullptr && fix->at <= relative_->sensed_at) PlaceFrontThen(*fix);
+  if (!front_then_) {
+    snapshot_.front =
+        Without(snapshot_.rear.worth == Worth::kInvalid ? snapshot_.rear.reason
+                                                        : GuidanceReason::kCameraStale);
+    return;
+  }
+  const double rests_on_s = SecondsBetween(front_rests_on_, snapshot_.at);
+  if (rests_on_s > machine_.station.stale_after_s) {
+    snapshot_.front =
+        Without(rear_.IsSuspect() ? GuidanceReason::kSetUpSuspect : GuidanceReason::kStationStale);
+    return;
+  }
+  const double age_s = std::max(SecondsBetween(relative_->sensed_at, snapshot_.at), 0.0);
+  snapshot_.front =
+      Stated(Coasted(*front_then_, 0.0, 0.0, age_s, machine_.coast),
+             std::max(age_s, rests_on_s),
+             rear_.IsSuspect() ? GuidanceReason::kSetUpSuspect : GuidanceReason::kCameraCoasting);
 }
 
 void GuidanceCore::PlaceJoint() {

@@ -25,9 +25,10 @@ namespace tbm {
 //
 // How the numbers grow old. The rear shield rests on its last trusted fix, moved on by its speed
 // and by what the telescopic joint has closed since; the front shield on that and the last relative
-// pose. Up to two periods of its source a pose is
-// valid; then it coasts (guidance/shield/coast.h: sigma grows by a stated law) and says so; beyond
-// `stale_after_s`, or when a deviation's sigma exceeds `useful_sigma_m`, it is invalid.
+// pose. What a check of the references takes back is given up by everything that rests on it. Up to
+// two periods of its source a pose is valid; then it coasts (guidance/shield/coast.h: sigma grows
+// by a stated law) and says so; beyond `stale_after_s`, or when a deviation's sigma exceeds
+// `useful_sigma_m`, it is invalid.
 class GuidanceCore {
  public:
   // All three outlive the core.
@@ -57,9 +58,11 @@ class GuidanceCore {
   void Forget();
   void WatchSources();
   void PlaceRear();
-  UncertainRigid3 RearNow(const RearShieldFix& fix) const;
+  UncertainRigid3 RearAt(const RearShieldFix& fix, Timestamp when) const;
   UncertainRigid3 RearFromFront() const;
   void PlaceFront();
+  void PlaceFrontThen(const RearShieldFix& fix);
+  void CoastFront();
   void PlaceJoint();
   void PlacePoints();
   void PlacePoint(std::size_t index);
@@ -78,6 +81,8 @@ class GuidanceCore {
   std::optional<RelativeSeen> relative_;  // the last usable one
   // The front shield at that exposure, as long as the rear shield was known then.
   std::optional<UncertainRigid3> front_then_;
+  Timestamp front_rests_on_;       // when the rear shield was fixed, under front_then_
+  std::uint64_t quarantines_ = 0;  // of the rear shield's fixes, that have been followed
   std::optional<InternalChainage> rear_hint_;
   std::vector<PointTrack> tracks_;  // one for each point; its size never changes
   std::optional<Timestamp> last_now_;

@@ -31,6 +31,8 @@ class RearTracker {
   const RearShieldFix* fix() const;
   // The station may have moved: readings after a moment are not to be used.
   bool IsSuspect() const { return set_up_ && set_up_->number != 0 && set_up_->trusted_until; }
+  // How often fixes were taken back: whatever was made of them since is to be thought over.
+  std::uint64_t quarantines() const { return quarantines_; }
   GuidanceReason trouble() const { return trouble_; }
   std::uint64_t set_up_number() const { return set_up_ ? set_up_->number : 0; }
 
@@ -58,6 +60,7 @@ class RearTracker {
   std::array<Kept, kMaxPrisms> kept_{};
   std::optional<SetUpKnown> set_up_;
   FixedVector<PastFix, kMostFixes> past_;  // oldest first
+  std::uint64_t quarantines_ = 0;
   GuidanceReason trouble_ = GuidanceReason::kNoSetUp;
 };
 

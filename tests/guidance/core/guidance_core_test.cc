@@ -55,7 +55,11 @@ class Core : public testing::Test {
     at_ = drive_.now();
   }
 
-  const Snapshot& Begin() { return core_.Advance(round_, at_); }
+  const Snapshot& Begin() {
+    core_.Advance(round_, at_);
+    begun_with_s_ = core_.snapshot().station.age_s.value_or(0.0);
+    return core_.snapshot();
+  }
   // What keeps coming while one source is silent: the camera's poses, every five seconds.
   const Snapshot& CameraGoesOn(Duration after) {
     const auto live = Without<SetUpKnown>(Without<PrismSeen>(round_));
@@ -80,6 +84,19 @@ class Core : public testing::Test {
   const Snapshot& StationGoesOn(Duration after) {
     return core_.Advance(Later(Without<RelativeSeen>(round_), after), at_ + after);
   }
+  // The round again, later, and everything seen 30 mm further east: the pillar was knocked.
+  std::vector<GuidanceInput> Knocked(Duration after) const {
+    auto knocked = Later(Without<SetUpKnown>(round_), after);
+    for (GuidanceInput& input : knocked) {
+      if (auto* prism = std::get_if<PrismSeen>(&input)) prism->p_in_site.x() += 0.03;
+    }
+    return knocked;
+  }
+  SetUpKnown SuspectSince(Timestamp last_good) const {
+    SetUpKnown set_up = std::get<SetUpKnown>(Only<SetUpKnown>(round_).front());
+    set_up.trusted_until = last_good;
+    return set_up;
+  }
   const PointState& Cutter() const {
     return core_.snapshot().points[TheMachine().machine.steer_by];
   }
@@ -94,6 +111,7 @@ class Core : public testing::Test {
   std::vector<GuidanceInput> round_;
   Timestamp at_;
   Duration went_on_{};
+  double begun_with_s_ = 0.0;  // age of the first fix
   GuidanceCore core_{TheMachine().machine, TheMachine().rig, TheMachine().axis};
 };
 
@@ -297,7 +315,7 @@ TEST_F(Core, WithTheCameraDirtyTheFrontShieldCoastsAndThenEnds) {
   EXPECT_EQ(core_.snapshot().rear.worth, Worth::kValid);
   EXPECT_EQ(core_.snapshot().front.worth, Worth::kDegraded);
   EXPECT_EQ(core_.snapshot().front.reason, GuidanceReason::kCameraCoasting);
-  EXPECT_NEAR(core_.snapshot().front.age_s, 20.0, 0.5);
+  EXPECT_NEAR(core_.snapshot().front.age_s, 20.0 + begun_with_s_, 1e-6);  // of the fix below it
   const Eigen::Matrix3d now = core_.snapshot().front.site_from_shield.covariance.block<3, 3>(3, 3);
   // 1 mm/s along, in 20 s.
   EXPECT_GT(std::sqrt(now.trace()), 0.02);
@@ -322,16 +340,11 @@ TEST_F(Core, AFrameWithoutAPoseIsNoPoseAndItsReasonIsTold) {
 TEST_F(Core, WhatWasSeenSinceTheLastGoodCheckIsNotUsedWhenTheStationIsSuspect) {
   Begin();
   const Eigen::Vector3d before = core_.snapshot().rear.site_from_shield.b_from_a.translation;
-  // The pillar was knocked after the check: everything that follows is 30 mm to the east.
-  auto knocked = Later(Without<SetUpKnown>(round_), seconds(40));
-  for (GuidanceInput& input : knocked) {
-    if (auto* prism = std::get_if<PrismSeen>(&input)) prism->p_in_site.x() += 0.03;
-  }
-  core_.Advance(knocked, at_ + seconds(40));
+  // The pillar was knocked after the check.
+  core_.Advance(Knocked(seconds(40)), at_ + seconds(40));
   EXPECT_NEAR(
       core_.snapshot().rear.site_from_shield.b_from_a.translation.x() - before.x(), 0.03, 0.003);
-  auto set_up = std::get<SetUpKnown>(Only<SetUpKnown>(round_).front());
-  set_up.trusted_until = at_ + seconds(5);
+  SetUpKnown set_up = SuspectSince(at_ + seconds(5));
   const auto live = Later(Without<SetUpKnown>(Without<PrismSeen>(round_)), seconds(41));
   auto with_check = live;
   with_check.insert(with_check.begin(), set_up);
@@ -349,6 +362,45 @@ TEST_F(Core, WhatWasSeenSinceTheLastGoodCheckIsNotUsedWhenTheStationIsSuspect) {
   EXPECT_NEAR(
       core_.snapshot().rear.site_from_shield.b_from_a.translation.x() - before.x(), 0.03, 0.003);
   EXPECT_EQ(core_.snapshot().fix_trouble, GuidanceReason::kNone);
+}
+
+// The pillar was knocked and the camera went blind before the check found it: what coasts rests on
+// a fix that is taken back.
+TEST_F(Core, TheCoastingFrontShieldGivesUpWhatIsTakenBack) {
+  Begin();
+  const Eigen::Vector3d before = core_.snapshot().front.site_from_shield.b_from_a.translation;
+  core_.Advance(Knocked(seconds(40)), at_ + seconds(40));
+  const ShieldState& front = core_.snapshot().front;
+  EXPECT_GT((front.site_from_shield.b_from_a.translation - before).norm(), 0.025);
+  core_.Advance({}, at_ + seconds(50));
+  EXPECT_EQ(front.reason, GuidanceReason::kCameraCoasting);
+  core_.Advance(std::vector<GuidanceInput>{SuspectSince(at_ + seconds(5))}, at_ + seconds(55));
+  EXPECT_EQ(front.worth, Worth::kDegraded);
+  EXPECT_EQ(front.reason, GuidanceReason::kSetUpSuspect);
+  EXPECT_LT((front.site_from_shield.b_from_a.translation - before).norm(), 0.01);
+  EXPECT_NEAR(front.age_s, 55.0 + begun_with_s_, 1e-6);
+}
+
+TEST_F(Core, NothingIsLeftToCoastOnWhenAllOfItIsTakenBack) {
+  Begin();
+  core_.Advance({}, at_ + seconds(20));
+  EXPECT_EQ(core_.snapshot().front.worth, Worth::kDegraded);
+  core_.Advance(std::vector<GuidanceInput>{SuspectSince(at_ - seconds(60))}, at_ + seconds(21));
+  EXPECT_EQ(core_.snapshot().front.worth, Worth::kInvalid);
+  EXPECT_EQ(core_.snapshot().front.reason, GuidanceReason::kSetUpSuspect);
+}
+
+// The camera's exposure is fresh enough to coast on, the fix of the rear shield below it is not.
+TEST_F(Core, TheCoastingFrontShieldEndsWithTheFixItRestsOn) {
+  Begin();
+  CameraGoesOn(seconds(880));
+  EXPECT_EQ(core_.snapshot().front.reason, GuidanceReason::kStationCoasting);
+  core_.Advance({}, at_ + seconds(885));
+  EXPECT_EQ(core_.snapshot().front.reason, GuidanceReason::kCameraCoasting);
+  core_.Advance({}, at_ + seconds(930));
+  EXPECT_EQ(core_.snapshot().camera.freshness, Freshness::kCoasting);
+  EXPECT_EQ(core_.snapshot().front.worth, Worth::kInvalid);
+  EXPECT_EQ(core_.snapshot().front.reason, GuidanceReason::kStationStale);
 }
 
 TEST_F(Core, WithNothingTrustedThereIsNoPosition) {
