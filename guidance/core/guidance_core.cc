@@ -93,10 +93,7 @@ const Snapshot& GuidanceCore::Advance(std::span<const GuidanceInput> inputs, Tim
   for (const GuidanceInput& input : inputs) {
     std::visit([this](const auto& one) { Take(one); }, input);
   }
-  if (rear_.quarantines() != quarantines_) {
-    quarantines_ = rear_.quarantines();
-    front_then_.reset();
-  }
+  if (rear_.quarantines() != quarantines_) GiveUpWhatWasTakenBack();
   snapshot_.at = now;
   WatchSources();
   const bool has_exposure = snapshot_.camera.freshness == Freshness::kFresh;
@@ -137,6 +134,17 @@ void GuidanceCore::Forget() {
   target_tilt_.Forget();
   camera_tilt_.Forget();
   joint_.Forget();
+}
+
+// Which of the looks of a track came from readings that are not trusted any more nobody has written
+// down: all of them go.
+void GuidanceCore::GiveUpWhatWasTakenBack() {
+  quarantines_ = rear_.quarantines();
+  front_then_.reset();
+  for (PointTrack& track : tracks_) {
+    track.right = Track(machine_.track);
+    track.up = Track(machine_.track);
+  }
 }
 
 void GuidanceCore::WatchSources() {

@@ -56,6 +56,7 @@ class GuidanceCore {
   void Take(const TiltSeen& seen);
   void Take(const AlarmOrder& order);
   void Forget();
+  void GiveUpWhatWasTakenBack();
   void WatchSources();
   void PlaceRear();
   UncertainRigid3 RearAt(const RearShieldFix& fix, Timestamp when) const;

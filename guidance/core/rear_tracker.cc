@@ -64,8 +64,6 @@ void RearTracker::Add(const SetUpKnown& set_up,
       !set_up_ || set_up_->number != set_up.number || set_up_->covariance != set_up.covariance;
   const RearShieldFix* before = fix();
   set_up_ = set_up;
-  // Fixes stand in the order of time: another one now is an older one, unless it was doubted
-  // before.
   const RearShieldFix* now = fix();
   if (before != nullptr && (now == nullptr || now->at < before->at)) ++quarantines_;
   if (set_up.number == 0) {

@@ -403,6 +403,34 @@ TEST_F(Core, TheCoastingFrontShieldEndsWithTheFixItRestsOn) {
   EXPECT_EQ(core_.snapshot().front.reason, GuidanceReason::kStationStale);
 }
 
+TEST_F(Core, TrendAndLookAheadForgetWhatIsTakenBack) {
+  Timestamp checked_at;
+  for (int i = 1; i <= 12; ++i) {
+    drive_.Measure(2100.0 + 1.5 * i);
+    core_.Advance(drive_.inputs(), drive_.now());
+    if (i == 11) checked_at = drive_.now();
+  }
+  ASSERT_TRUE(Cutter().trend_right && Cutter().trend_up);
+  ASSERT_EQ(core_.snapshot().ahead.size(), 20u);
+  SetUpKnown set_up = std::get<SetUpKnown>(Only<SetUpKnown>(drive_.inputs()).front());
+  const Timestamp now = drive_.now() + milliseconds(300);
+  // A check that takes nothing back changes nothing.
+  set_up.trusted_until = now;
+  core_.Advance(std::vector<GuidanceInput>{set_up}, now);
+  EXPECT_TRUE(Cutter().trend_right && !core_.snapshot().ahead.empty());
+  set_up.trusted_until = checked_at;
+  core_.Advance(std::vector<GuidanceInput>{set_up}, now);
+  EXPECT_EQ(Cutter().worth, Worth::kDegraded);
+  EXPECT_FALSE(Cutter().trend_right || Cutter().trend_up);
+  EXPECT_TRUE(core_.snapshot().ahead.empty());
+  // They begin anew with the next good look.
+  drive_.Measure(2120.0);
+  core_.Advance(drive_.inputs(), drive_.now());
+  EXPECT_EQ(Cutter().worth, Worth::kValid);
+  EXPECT_FALSE(Cutter().trend_right);
+  EXPECT_EQ(core_.snapshot().ahead.size(), 20u);
+}
+
 TEST_F(Core, WithNothingTrustedThereIsNoPosition) {
   auto never = round_;
   for (GuidanceInput& input : never) {
