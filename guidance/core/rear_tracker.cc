@@ -66,12 +66,26 @@ void RearTracker::Add(const SetUpKnown& set_up,
   set_up_ = set_up;
   const RearShieldFix* now = fix();
   if (before != nullptr && (now == nullptr || now->at < before->at)) ++quarantines_;
+  DropDoubted(set_up);
   if (set_up.number == 0) {
     trouble_ = GuidanceReason::kNoSetUp;
   } else if (is_another) {
     trouble_ = past_.empty() ? GuidanceReason::kNoFix : GuidanceReason::kNone;
     Fix(camera_tilt, joint);
   }
+}
+
+// When another set-up comes instead of a suspect one, nobody will say any more whether the readings
+// that were doubted are good.
+void RearTracker::DropDoubted(const SetUpKnown& set_up) {
+  if (set_up.number == 0) return;
+  if (suspect_ && suspect_->number != set_up.number) {
+    while (!past_.empty() && past_.back().newest_reading > *suspect_->trusted_until) {
+      past_.erase(past_.size() - 1);
+    }
+  }
+  suspect_.reset();
+  if (set_up.trusted_until) suspect_ = set_up;
 }
 
 void RearTracker::Fix(const TiltMean& camera_tilt, const JointClosing& joint) {

@@ -54,11 +54,13 @@ class RearTracker {
   void Fix(const TiltMean& camera_tilt, const JointClosing& joint);
   std::optional<HeadingFix> EarlierHeading(Timestamp at) const;
   bool IsTrusted(Timestamp sensed_at) const;
+  void DropDoubted(const SetUpKnown& set_up);
 
   const Machine& machine_;
   const Rig& rig_;
   std::array<Kept, kMaxPrisms> kept_{};
   std::optional<SetUpKnown> set_up_;
+  std::optional<SetUpKnown> suspect_;      // the last one, until it is found good again
   FixedVector<PastFix, kMostFixes> past_;  // oldest first
   std::uint64_t quarantines_ = 0;
   GuidanceReason trouble_ = GuidanceReason::kNoSetUp;

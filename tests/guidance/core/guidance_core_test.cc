@@ -431,6 +431,42 @@ TEST_F(Core, TrendAndLookAheadForgetWhatIsTakenBack) {
   EXPECT_EQ(core_.snapshot().ahead.size(), 20u);
 }
 
+TEST_F(Core, ANewSetUpDoesNotBringBackWhatTheOldOneTookBack) {
+  for (const bool there_was_none_between : {false, true}) {
+    GuidanceCore core(TheMachine().machine, TheMachine().rig, TheMachine().axis);
+    core.Advance(round_, at_);
+    const Eigen::Vector3d before = core.snapshot().rear.site_from_shield.b_from_a.translation;
+    core.Advance(Knocked(seconds(40)), at_ + seconds(40));
+    SetUpKnown set_up = SuspectSince(at_ + seconds(5));
+    core.Advance(std::vector<GuidanceInput>{set_up}, at_ + seconds(41));
+    if (there_was_none_between) {
+      core.Advance(std::vector<GuidanceInput>{SetUpKnown{}}, at_ + seconds(42));
+      EXPECT_EQ(core.snapshot().rear.worth, Worth::kInvalid);
+    }
+    set_up.number += 1;
+    set_up.trusted_until.reset();
+    core.Advance(std::vector<GuidanceInput>{set_up}, at_ + seconds(43));
+    ASSERT_NE(core.snapshot().rear.worth, Worth::kInvalid);
+    const Eigen::Vector3d now = core.snapshot().rear.site_from_shield.b_from_a.translation;
+    EXPECT_LT((now - before).norm(), 0.01) << there_was_none_between;
+  }
+}
+
+// The instrument was away and came back with the same set-up, checked and good.
+TEST_F(Core, TheSameSetUpFoundGoodBringsBackWhatWasDoubted) {
+  Begin();
+  const Eigen::Vector3d before = core_.snapshot().rear.site_from_shield.b_from_a.translation;
+  core_.Advance(Knocked(seconds(40)), at_ + seconds(40));
+  SetUpKnown set_up = SuspectSince(at_ + seconds(5));
+  core_.Advance(std::vector<GuidanceInput>{set_up, SetUpKnown{}}, at_ + seconds(41));
+  set_up.trusted_until.reset();
+  core_.Advance(std::vector<GuidanceInput>{set_up}, at_ + seconds(42));
+  set_up.number += 1;
+  core_.Advance(std::vector<GuidanceInput>{set_up}, at_ + seconds(43));
+  const Eigen::Vector3d now = core_.snapshot().rear.site_from_shield.b_from_a.translation;
+  EXPECT_NEAR(now.x() - before.x(), 0.03, 0.003);
+}
+
 TEST_F(Core, WithNothingTrustedThereIsNoPosition) {
   auto never = round_;
   for (GuidanceInput& input : never) {
