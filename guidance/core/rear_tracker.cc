@@ -48,11 +48,9 @@ void RearTracker::Add(const PrismSeen& seen,
                       const JointClosing& joint) {
   if (seen.prism >= machine_.prisms.size()) return;
   Kept& kept = kept_[seen.prism];
-  // Late and doubled readings change nothing.
-  const bool is_newer =
-      !kept.is_there || seen.set_up_number > kept.seen.set_up_number ||
-      (seen.set_up_number == kept.seen.set_up_number && seen.sensed_at > kept.seen.sensed_at);
-  if (!is_newer) return;
+  // Late and doubled readings change nothing. The set-up's number says nothing of the order: one
+  // that is taken up again has its old number.
+  if (kept.is_there && seen.sensed_at <= kept.seen.sensed_at) return;
   kept = {seen, true};
   Fix(camera_tilt, joint);
 }
@@ -116,7 +114,8 @@ void RearTracker::Fix(const TiltMean& camera_tilt, const JointClosing& joint) {
                              moved_m.value_or(0.0),
                              ClosingSigma(moved_m.value_or(0.0))});
   }
-  if (problem.fixes.empty()) return;
+  // Of a set-up that is taken up again some readings may be left from before the later one.
+  if (problem.fixes.empty() || (!past_.empty() && newest < past_.back().newest_reading)) return;
   problem.at = newest;
   if (const auto tilt = camera_tilt.Around(newest)) {
     const double sigma_rad =

@@ -467,6 +467,52 @@ TEST_F(Core, TheSameSetUpFoundGoodBringsBackWhatWasDoubted) {
   EXPECT_NEAR(now.x() - before.x(), 0.03, 0.003);
 }
 
+// After undo_move the set-up has its old, lower number again.
+TEST_F(Core, ASetUpThatIsTakenUpAgainIsReadAgain) {
+  Begin();
+  const Eigen::Vector3d before = core_.snapshot().rear.site_from_shield.b_from_a.translation;
+  const SetUpKnown first = std::get<SetUpKnown>(Only<SetUpKnown>(round_).front());
+  SetUpKnown second = first;
+  second.number += 1;
+  auto moved = Later(Without<SetUpKnown>(round_), seconds(40));
+  for (GuidanceInput& input : moved) {
+    if (auto* prism = std::get_if<PrismSeen>(&input)) prism->set_up_number = second.number;
+  }
+  moved.insert(moved.begin(), second);
+  core_.Advance(moved, at_ + seconds(40));
+  EXPECT_EQ(core_.snapshot().set_up_number, second.number);
+  auto undone = Knocked(seconds(80));
+  undone.insert(undone.begin(), first);
+  core_.Advance(undone, at_ + seconds(80));
+  EXPECT_EQ(core_.snapshot().set_up_number, first.number);
+  EXPECT_EQ(core_.snapshot().rear.worth, Worth::kValid);
+  EXPECT_EQ(core_.snapshot().fix->prisms_used, 4);
+  const Eigen::Vector3d now = core_.snapshot().rear.site_from_shield.b_from_a.translation;
+  EXPECT_NEAR(now.x() - before.x(), 0.03, 0.003);
+}
+
+// A prism that the second set-up never saw still has its reading of the first.
+TEST_F(Core, AnOlderReadingOfATakenUpSetUpIsNotTheNewestFix) {
+  Begin();
+  const SetUpKnown first = std::get<SetUpKnown>(Only<SetUpKnown>(round_).front());
+  SetUpKnown second = first;
+  second.number += 1;
+  auto moved = Knocked(seconds(40));
+  std::erase_if(moved, [](const GuidanceInput& input) {
+    const auto* prism = std::get_if<PrismSeen>(&input);
+    return prism != nullptr && prism->prism > 1;
+  });
+  for (GuidanceInput& input : moved) {
+    if (auto* prism = std::get_if<PrismSeen>(&input)) prism->set_up_number = second.number;
+  }
+  moved.insert(moved.begin(), second);
+  core_.Advance(moved, at_ + seconds(40));
+  const Timestamp fixed_at = core_.snapshot().fix->at;
+  core_.Advance(std::vector<GuidanceInput>{first}, at_ + seconds(41));
+  EXPECT_EQ(core_.snapshot().fix->at, fixed_at);
+  EXPECT_EQ(core_.snapshot().fix_trouble, GuidanceReason::kNone);
+}
+
 TEST_F(Core, WithNothingTrustedThereIsNoPosition) {
   auto never = round_;
   for (GuidanceInput& input : never) {
