@@ -14,6 +14,9 @@ constexpr double kSpeedPrior_m_per_s = 2e-3;
 constexpr double kSpeedPriorWithoutJoint_m_per_s = 5e-3;
 // Readings of one second share the vibration of that second: averaging more of them gains nothing.
 constexpr int kMostIndependentTilts = 25;
+// A fix comes with every prism, every few seconds, and a check of the references every ten minutes:
+// what is kept must reach back behind the last check. Two within this time are kept at most.
+constexpr Duration kFixesApart = std::chrono::seconds(30);
 
 GuidanceReason ReasonOf(RearShieldFailure failure) {
   switch (failure) {
@@ -131,8 +134,29 @@ void RearTracker::Fix(const TiltMean& camera_tilt, const JointClosing& joint) {
     return;
   }
   trouble_ = GuidanceReason::kNone;
+  Keep({*fix, newest, !problem.heading});
+}
+
+// Of three that are close together the middle one goes, or the first if it is worth less.
+void RearTracker::Keep(const PastFix& newest) {
+  const std::size_t count = past_.size();
+  if (count >= 2) {
+    const PastFix& first = past_[count - 2];
+    const PastFix& middle = past_[count - 1];
+    const bool is_newest_trusted =
+        IsTrusted(middle.newest_reading) && !IsTrusted(newest.newest_reading);
+    if (newest.newest_reading - first.newest_reading < kFixesApart && !is_newest_trusted) {
+      past_.erase(WorthOf(first) < WorthOf(middle) ? count - 2 : count - 1);
+    }
+  }
   if (past_.full()) past_.erase(0);
-  past_.push_back({*fix, newest, !problem.heading});
+  past_.push_back(newest);
+}
+
+// May it be used, and how many prisms check each other; one alone has not even a heading of its
+// own.
+std::pair<bool, int> RearTracker::WorthOf(const PastFix& past) const {
+  return {IsTrusted(past.newest_reading), past.fix.prisms_used};
 }
 
 std::optional<HeadingFix> RearTracker::EarlierHeading(Timestamp at) const {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "guidance/core/input.h"
 #include "guidance/core/joint_closing.h"
@@ -39,7 +40,7 @@ class RearTracker {
   void Forget();  // everything but the set-up: the clock was set
 
  private:
-  static constexpr std::size_t kMostFixes = 64;
+  static constexpr std::size_t kMostFixes = 64;  // at least a quarter of an hour
 
   struct Kept {
     PrismSeen seen;
@@ -53,6 +54,8 @@ class RearTracker {
 
   void Fix(const TiltMean& camera_tilt, const JointClosing& joint);
   std::optional<HeadingFix> EarlierHeading(Timestamp at) const;
+  void Keep(const PastFix& newest);
+  std::pair<bool, int> WorthOf(const PastFix& past) const;
   bool IsTrusted(Timestamp sensed_at) const;
   void DropDoubted(const SetUpKnown& set_up);
 

@@ -513,6 +513,49 @@ TEST_F(Core, AnOlderReadingOfATakenUpSetUpIsNotTheNewestFix) {
   EXPECT_EQ(core_.snapshot().fix_trouble, GuidanceReason::kNone);
 }
 
+// A reading every five seconds, and a check of the references that says after ten minutes that the
+// pillar had moved all the while.
+TEST_F(Core, WhatWasTrustedAtTheLastCheckIsStillKnownAtTheNext) {
+  Begin();
+  const RearShieldFix before = *core_.snapshot().fix;
+  const auto live = Without<SetUpKnown>(Without<PrismSeen>(round_));
+  const auto prisms = Only<PrismSeen>(round_);
+  for (int i = 1; i <= 120; ++i) {
+    const Duration after = seconds(5 * i);
+    auto inputs = Later(live, after);
+    PrismSeen prism = std::get<PrismSeen>(prisms[static_cast<std::size_t>(i) % prisms.size()]);
+    prism.sensed_at = at_ + after;
+    prism.p_in_site.x() += 0.03;
+    inputs.push_back(prism);
+    core_.Advance(inputs, at_ + after);
+  }
+  went_on_ = seconds(600);
+  core_.Advance(std::vector<GuidanceInput>{SuspectSince(at_ + seconds(2))}, at_ + seconds(600));
+  ASSERT_EQ(core_.snapshot().rear.worth, Worth::kDegraded);
+  EXPECT_EQ(core_.snapshot().rear.reason, GuidanceReason::kSetUpSuspect);
+  EXPECT_EQ(core_.snapshot().fix->at, before.at);
+  EXPECT_EQ(core_.snapshot().fix->site_from_rear_shield, before.site_from_rear_shield);
+}
+
+// The other prisms are hidden after a while: what is left has its heading from the last fix that
+// had one of its own, however many without came after.
+TEST_F(Core, AFixWithAHeadingOfItsOwnIsNotGivenUpForOneWithout) {
+  auto one = round_;
+  std::erase_if(one, [](const GuidanceInput& input) {
+    const auto* prism = std::get_if<PrismSeen>(&input);
+    return prism != nullptr && prism->prism != 0;
+  });
+  // No heading before this: the first prism alone is no fix, then all four are.
+  core_.Advance(Later(one, -seconds(30)), at_ - seconds(30));
+  Begin();
+  const Timestamp fixed_at = core_.snapshot().fix->at;
+  for (int i = 1; i <= 60; ++i) {
+    core_.Advance(Later(Without<SetUpKnown>(one), seconds(30 + 5 * i)), at_ + seconds(30 + 5 * i));
+    ASSERT_EQ(core_.snapshot().fix_trouble, GuidanceReason::kNone) << i;
+  }
+  EXPECT_GT(SecondsBetween(fixed_at, core_.snapshot().fix->at), 300.0);
+}
+
 TEST_F(Core, WithNothingTrustedThereIsNoPosition) {
   auto never = round_;
   for (GuidanceInput& input : never) {
