@@ -24,6 +24,9 @@ class JointClosing {
   // lies outside of what was watched without a gap.
   std::optional<double> Between(Timestamp from, Timestamp to) const;
 
+  // Until when the joint was watched.
+  const std::optional<Timestamp>& last() const { return last_; }
+
   void Forget() { *this = JointClosing(); }
 
  private:

@@ -556,6 +556,26 @@ TEST_F(Core, AFixWithAHeadingOfItsOwnIsNotGivenUpForOneWithout) {
   EXPECT_GT(SecondsBetween(fixed_at, core_.snapshot().fix->at), 300.0);
 }
 
+// The camera is silent for so short that the joint's closing still counts as known: nobody has
+// watched it since.
+TEST_F(Core, WhatTheJointDidSinceTheLastPoseNobodyKnows) {
+  Begin();
+  const auto along_sigma_m = [&](double after_s) {
+    core_.Advance({}, at_ + milliseconds(static_cast<int>(1e3 * after_s)));
+    const ShieldState& rear = core_.snapshot().rear;
+    const Eigen::Vector3d ahead =
+        rear.site_from_shield.b_from_a.rotation * Eigen::Vector3d::UnitX();
+    const Eigen::Matrix3d covariance = rear.site_from_shield.covariance.bottomRightCorner<3, 3>();
+    return std::sqrt(ahead.dot(covariance * ahead));
+  };
+  EXPECT_LT(along_sigma_m(0.0), 0.03);
+  const double after_5_s_m = along_sigma_m(5.0);
+  EXPECT_GT(after_5_s_m, 0.9 * 5.0 * 8e-3);
+  EXPECT_LT(after_5_s_m, 1.1 * 5.0 * 8e-3 + 0.03);
+  // Where it is not known at all, at 20 s, there is no step.
+  EXPECT_LT(along_sigma_m(17.0), 17.0 * 0.04);
+}
+
 TEST_F(Core, WithNothingTrustedThereIsNoPosition) {
   auto never = round_;
   for (GuidanceInput& input : never) {
