@@ -205,7 +205,8 @@ UncertainRigid3 GuidanceCore::RearAt(const RearShieldFix& fix, Timestamp when) c
   if (closed_m) {
     now.b_from_a.translation += turned.col(0) * *closed_m;
     const double across_m = machine_.track.crab_sigma_per_m * *closed_m;
-    const double unwatched_s = std::max(SecondsBetween(*joint_.last(), when), 0.0);
+    const double unwatched_s =
+        std::max(SecondsBetween(*joint_.last(), std::max(fix.at, when)), 0.0);
     sigma_m = {
         std::hypot(ClosingSigma(*closed_m), kRegrip_m_per_s * unwatched_s), across_m, across_m};
     const double steering = machine_.track.steering_per_sqrt_m;

@@ -576,6 +576,25 @@ TEST_F(Core, WhatTheJointDidSinceTheLastPoseNobodyKnows) {
   EXPECT_LT(along_sigma_m(17.0), 17.0 * 0.04);
 }
 
+TEST_F(Core, WhatTheJointDoesFromTheExposureToALaterFixNobodyKnows) {
+  Begin();
+  const auto live = Without<SetUpKnown>(Without<PrismSeen>(round_));
+  const auto prisms = Only<PrismSeen>(round_);
+  for (int i = 1; i <= 100; ++i) {  // an exposure takes 0.9 s to come
+    auto inputs = Later(live, milliseconds(200 * i - 600));
+    PrismSeen prism = std::get<PrismSeen>(prisms[static_cast<std::size_t>(i) % prisms.size()]);
+    prism.sensed_at = at_ + milliseconds(200 * i);
+    inputs.push_back(prism);
+    core_.Advance(inputs, at_ + milliseconds(200 * i));
+  }
+  const ShieldState& rear = core_.snapshot().rear;
+  const double later_s = SecondsBetween(core_.snapshot().valid_at, core_.snapshot().fix->at);
+  ASSERT_GT(later_s, 0.6);
+  const Eigen::Vector3d ahead = rear.site_from_shield.b_from_a.rotation * Eigen::Vector3d::UnitX();
+  const Eigen::Matrix3d covariance = rear.site_from_shield.covariance.bottomRightCorner<3, 3>();
+  EXPECT_GT(std::sqrt(ahead.dot(covariance * ahead)), 0.99 * 8e-3 * later_s);
+}
+
 TEST_F(Core, WithNothingTrustedThereIsNoPosition) {
   auto never = round_;
   for (GuidanceInput& input : never) {
