@@ -1,6 +1,7 @@
 #include "hmi_bridge/core/console_board.h"
 
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <numbers>
 #include <string>
@@ -12,6 +13,7 @@
 #include "guidance/config/guidance_file.h"
 #include "tests/idl/guidance_samples.h"
 #include "tests/idl/samples.h"
+#include "tests/support/temp_folder.h"
 
 namespace tbm::hmi {
 namespace {
@@ -26,8 +28,15 @@ constexpr std::int64_t kMs = 1'000'000;
 
 const GuidedMachine& Example() {
   static const GuidedMachine machine = [] {
+    const test::TempFolder folder;
+    for (const char* file : {"guidance/app/example/machine.yaml",
+                             "guidance/app/example/axis.xml",
+                             "pose/app/example/rig.yaml"}) {
+      const std::filesystem::path from = std::string(TBM_SOURCE_DIR "/") + file;
+      std::filesystem::copy_file(from, folder / from.filename().string());
+    }
     MachineFaults warnings;
-    auto loaded = LoadGuidedMachine(TBM_SOURCE_DIR "/guidance/app/example/machine.yaml", &warnings);
+    auto loaded = LoadGuidedMachine(folder / "machine.yaml", &warnings);
     return std::move(loaded).value();
   }();
   return machine;
@@ -60,14 +69,16 @@ struct Console {
   }
   std::vector<std::string> Alarms() {
     std::vector<std::string> keys;
-    for (const Json& alarm : Part("alarms")["list"]) {
+    const Json alarms = Part("alarms");
+    for (const Json& alarm : alarms["list"]) {
       keys.push_back(alarm["source"].get<std::string>() + "/" + alarm["code"].get<std::string>() +
                      " " + alarm["phase"].get<std::string>());
     }
     return keys;
   }
   Json AlarmOf(const std::string& code) {
-    for (const Json& alarm : Part("alarms")["list"]) {
+    const Json alarms = Part("alarms");
+    for (const Json& alarm : alarms["list"]) {
       if (alarm["code"] == code) return alarm;
     }
     return nullptr;
