@@ -37,10 +37,14 @@ struct ApiFault {
 };
 using ApiAnswer = std::variant<std::string, ApiFault>;  // JSON, or why not
 
+// Later than every row; a double and an std::int64_t hold it exactly.
+inline constexpr double kEndOfTime_utc_ms = 1e15;
+
+// Numbers are finite and within openapi.yaml's bounds. Without bounds of time it is everything.
 struct HistoryQuestion {
   std::string point;
   double from_utc_ms = 0.0;
-  double to_utc_ms = 0.0;
+  double to_utc_ms = kEndOfTime_utc_ms;
   int most = 1000;
 };
 

@@ -46,6 +46,7 @@ ALLOWED = {
     "guidance/config": {"Eigen", "pose/base", "pose/rig", "guidance/axis", "guidance/core/machine.h", "devices/replay/csv.h", "yaml-cpp", "fmt", "pugixml.hpp", "openssl"},
     "hmi_bridge/core": {"Eigen", *POSE, "guidance/axis", "guidance/core", "guidance/shield", "idl/cpp/messages.h", "idl/cpp/guidance_messages.h",
                         "idl/cpp/alarm.h", "idl/cpp/bounded_text.h", "idl/cpp/words.h", "hmi_bridge/server/console_source.h", "nlohmann", "fmt"},
+    "hmi_bridge/server": {"pose/base", "boost", "openssl", "nlohmann", "fmt", "zlib.h", *POSIX},
     "hmi_bridge/app": {"Eigen", *POSE_ALL, "pose/app/service_manager.h", "devices/app/end_signals.h", "guidance/axis", "guidance/config", "guidance/core",
                        "guidance/app/exit_code.h", "idl/cpp", "hmi_bridge", "nlohmann", "fmt", "CLI", "yaml-cpp", *POSIX},
     "idl/cpp": {"Eigen", *POSE_ALL, "fastdds", "fastrtps", "fastcdr", "tbm_idl", "fmt", *POSIX},
@@ -60,7 +61,7 @@ ONLY_IN = {"ceres": {"pose/solve/penalty_pose.cc"},
            "emmintrin.h": {"pose/centres/vectors_sse2.h"},
            "arm_neon.h": {"pose/centres/vectors_neon.h"},
            "arv.h": {"devices/camera", "devices/app"},
-           "boost": {"devices/total_station/asio_link.cc"},
+           "boost": {"devices/total_station/asio_link.cc", "hmi_bridge/server"},
            "pugixml.hpp": {"guidance/config"},
            "yaml-cpp": {"pose/rig", "pose/app", "guidance/config", "devices/app", "hmi_bridge/app"}}
 
