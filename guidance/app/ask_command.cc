@@ -92,17 +92,10 @@ dds::Command CommandOf(const AskRequest& request, const std::string& machine, Ti
 }  // namespace
 
 ExitCode RunAsk(const AskRequest& request, const Console& console) {
-  dds::ParticipantConfig config;
-  config.domain_id = request.domain_id;
-  config.name = "tbm_ask";
-  if (!request.interfaces.empty()) config.interfaces = request.interfaces;
-  config.peers = request.peers;
-  if (const auto problems = dds::Problems(config); !problems.empty()) {
-    for (const std::string& problem : problems) Complain(console, problem);
-    return ExitCode::kBadInput;
-  }
+  const auto config = ParticipantOn(request.network, "tbm_ask", console);
+  if (!config) return ExitCode::kBadInput;
   const SystemClock clock;
-  dds::Participant participant(config);
+  dds::Participant participant(*config);
   dds::Subscriber<dds::CommandReply> replies(participant);
   dds::Publisher<dds::Command> commands(participant);
   std::string machine = request.machine;

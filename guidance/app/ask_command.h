@@ -1,10 +1,10 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "guidance/app/console.h"
 #include "guidance/app/exit_code.h"
+#include "guidance/app/live_network.h"
 
 namespace tbm {
 
@@ -15,9 +15,7 @@ struct AskRequest {
   std::string by;       // the person who asks
   std::string because;  // may be empty
   std::string machine;  // empty: the one machine that is heard
-  int domain_id = 25;
-  std::vector<std::string> interfaces;  // empty: 127.0.0.1
-  std::vector<std::string> peers;
+  LiveNetwork network;
   double wait_s = 300.0;  // for the last answer
 };
 

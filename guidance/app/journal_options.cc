@@ -59,13 +59,7 @@ CLI::App* AddRecord(CLI::App& app, JournalRequests& requests) {
   record->footer(kRecordHelp);
   record->add_option("--out,-o", request.out, "folder for the files; made when missing")
       ->required();
-  record->add_option("--domain", request.domain_id, "DDS domain")
-      ->check(CLI::Range(0, 232))
-      ->capture_default_str();
-  record->add_option(
-      "--interface", request.interfaces, "address or name of a network interface; 127.0.0.1");
-  record->add_option(
-      "--peer", request.peers, "address of a machine to look for; none: by multicast");
+  AddNetworkOptions(*record, request.network);
   record->add_option("--limit-mb", request.limit_mb, "most that all files in the folder may have")
       ->check(CLI::Range(std::int64_t{1}, std::int64_t{100'000'000}))
       ->capture_default_str();

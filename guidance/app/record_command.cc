@@ -121,15 +121,8 @@ std::string JournalSummary(const JournalStatus& status) {
 }  // namespace
 
 ExitCode RunRecord(const RecordRequest& request, const Console& console) {
-  dds::ParticipantConfig config;
-  config.domain_id = request.domain_id;
-  config.name = "tbm_record";
-  if (!request.interfaces.empty()) config.interfaces = request.interfaces;
-  config.peers = request.peers;
-  if (const auto problems = dds::Problems(config); !problems.empty()) {
-    for (const std::string& problem : problems) Complain(console, problem);
-    return ExitCode::kBadInput;
-  }
+  const auto config = ParticipantOn(request.network, "tbm_record", console);
+  if (!config) return ExitCode::kBadInput;
   if (const auto fault = MakeFolder(request.out)) {
     Complain(console, *fault);
     return ExitCode::kBadInput;
@@ -137,7 +130,7 @@ ExitCode RunRecord(const RecordRequest& request, const Console& console) {
   HoldSignals();
   Journal journal(OptionsOf(request));
   std::mutex mutex;
-  dds::Participant participant(config, [&](const dds::Alarm& alarm) {
+  dds::Participant participant(*config, [&](const dds::Alarm& alarm) {
     // Who speaks and who is silent is for the journal's reader to say.
     if (!alarm.active || alarm.kind == dds::AlarmKind::kSilent) return;
     const std::lock_guard lock(mutex);
@@ -156,7 +149,8 @@ ExitCode RunRecord(const RecordRequest& request, const Console& console) {
   console.out << JournalSummary(status) << std::flush;
   if (samples == 0 && request.seconds > 0.0) {
     Complain(console,
-             fmt::format("nothing heard on domain {} in {} s", request.domain_id, request.seconds));
+             fmt::format(
+                 "nothing heard on domain {} in {} s", request.network.domain_id, request.seconds));
     return ExitCode::kDds;
   }
   if (status.messages_dropped > 0) {

@@ -2,19 +2,17 @@
 
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "guidance/app/console.h"
 #include "guidance/app/exit_code.h"
+#include "guidance/app/live_network.h"
 
 namespace tbm {
 
 struct RecordRequest {
   std::string out;      // folder
   std::string program;  // stands in the header of each file
-  int domain_id = 25;
-  std::vector<std::string> interfaces;  // empty: 127.0.0.1
-  std::vector<std::string> peers;
+  LiveNetwork network;
   std::int64_t limit_mb = 20'000;  // of all journal files in the folder together
   double minutes = 30.0;           // of one file
   double seconds = 0.0;            // 0: until Ctrl-C

@@ -268,13 +268,7 @@ CLI::App* AddWatch(CLI::App& app, Requests& requests) {
   CLI::App* watch =
       app.add_subcommand("watch", "Live: what the operator steers by, and all that it rests on");
   watch->footer(kWatchHelp);
-  watch->add_option("--domain", request.domain_id, "DDS domain")
-      ->check(CLI::Range(0, 232))
-      ->capture_default_str();
-  watch->add_option(
-      "--interface", request.interfaces, "address or name of a network interface; 127.0.0.1");
-  watch->add_option(
-      "--peer", request.peers, "address of a machine to look for; none: by multicast");
+  AddNetworkOptions(*watch, request.network);
   watch->add_option("--seconds", request.seconds, "end after this time; 0: never")
       ->check(CLI::Range(0.0, 1e9));
   return watch;
@@ -293,12 +287,7 @@ CLI::App* AddAsk(CLI::App& app, Requests& requests) {
   ask->add_option("--wait", request.wait_s, "seconds, for the last answer")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
-  ask->add_option("--domain", request.domain_id, "DDS domain")
-      ->check(CLI::Range(0, 232))
-      ->capture_default_str();
-  ask->add_option(
-      "--interface", request.interfaces, "address or name of a network interface; 127.0.0.1");
-  ask->add_option("--peer", request.peers, "address of a machine to look for; none: by multicast");
+  AddNetworkOptions(*ask, request.network);
   return ask;
 }
 

@@ -152,8 +152,8 @@ int TerminalWidth() {
 
 void ShowScreen(const Inbox& inbox, const WatchRequest& request, const Console& console) {
   const bool with_colours = std::getenv("NO_COLOR") == nullptr;
-  std::string text =
-      fmt::format("tbm watch, domain {}; lengths in mm; Ctrl-C ends\n\n", request.domain_id);
+  std::string text = fmt::format("tbm watch, domain {}; lengths in mm; Ctrl-C ends\n\n",
+                                 request.network.domain_id);
   text += WatchScreen(inbox.Rows(), TerminalWidth(), with_colours);
   if (!inbox.has_heard())
     text +=
@@ -187,18 +187,11 @@ void ShowLines(Inbox& inbox, std::map<std::string, bool>& was_stale, const Conso
 }  // namespace
 
 ExitCode RunWatch(const WatchRequest& request, const Console& console) {
-  dds::ParticipantConfig config;
-  config.domain_id = request.domain_id;
-  config.name = "tbm_watch";
-  if (!request.interfaces.empty()) config.interfaces = request.interfaces;
-  config.peers = request.peers;
-  if (const auto problems = dds::Problems(config); !problems.empty()) {
-    for (const std::string& problem : problems) Complain(console, problem);
-    return ExitCode::kBadInput;
-  }
+  const auto config = ParticipantOn(request.network, "tbm_watch", console);
+  if (!config) return ExitCode::kBadInput;
   const StopSignals signals;
   Inbox inbox(!console.out_is_terminal);
-  dds::Participant participant(config, [&](const dds::Alarm& alarm) { inbox.AddAlarm(alarm); });
+  dds::Participant participant(*config, [&](const dds::Alarm& alarm) { inbox.AddAlarm(alarm); });
   const Subscriptions subscriptions(participant, inbox);
 
   const Instant started_at = std::chrono::steady_clock::now();
@@ -222,7 +215,8 @@ ExitCode RunWatch(const WatchRequest& request, const Console& console) {
   if (console.out_is_terminal) console.out << "\x1b[?25h\n" << std::flush;
   if (request.seconds > 0.0 && !stop_asked && !inbox.has_heard()) {
     Complain(console,
-             fmt::format("nothing heard on domain {} in {} s", request.domain_id, request.seconds));
+             fmt::format(
+                 "nothing heard on domain {} in {} s", request.network.domain_id, request.seconds));
     return ExitCode::kDds;
   }
   return ExitCode::kDone;

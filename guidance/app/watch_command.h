@@ -1,17 +1,15 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "guidance/app/console.h"
 #include "guidance/app/exit_code.h"
+#include "guidance/app/live_network.h"
 
 namespace tbm {
 
 struct WatchRequest {
-  int domain_id = 25;
-  std::vector<std::string> interfaces;  // empty: 127.0.0.1
-  std::vector<std::string> peers;
+  LiveNetwork network;
   double seconds = 0.0;  // 0: until Ctrl-C
 };
 

@@ -179,7 +179,7 @@ TEST(GuidanceProcess, GuidesFromItsNeighboursTopicsAndItsJournalReplaysBitForBit
     ask.verb = "acknowledge";
     ask.argument = "position_lost";
     ask.by = "O. Perator";
-    ask.domain_id = kDomain;
+    ask.network.domain_id = kDomain;
     std::ostringstream answer;
     EXPECT_EQ(RunAsk(ask, {answer, answer}), ExitCode::kDone) << answer.str();
     EXPECT_EQ(answer.str(), "guidance: done: acknowledged\n");

@@ -74,7 +74,7 @@ struct Outcome {
 
 Outcome Watch(int domain_id, double seconds, bool on_terminal = false) {
   WatchRequest request;
-  request.domain_id = domain_id;
+  request.network.domain_id = domain_id;
   request.seconds = seconds;
   std::ostringstream out;
   std::ostringstream err;
@@ -113,7 +113,7 @@ TEST(WatchCommand, SaysWhenNobodyIsThere) {
 
 TEST(WatchCommand, RefusesAPeerThatIsNoAddress) {
   WatchRequest request;
-  request.peers = {"300.1.1.1"};
+  request.network.peers = {"300.1.1.1"};
   request.seconds = 0.1;
   std::ostringstream out;
   std::ostringstream err;
