@@ -1,33 +1,49 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "hmi_bridge/core/console_board.h"
 #include "idl/cpp/words.h"
+#include "pose/base/check.h"
 
 namespace tbm::hmi {
 namespace {
 
-// Prometheus' text format, version 0.0.4. A number that is not known is not exported: a scrape
-// without it says so, a zero would lie.
+// Prometheus' text format, version 0.0.4: all lines of a metric stand together, whatever the order
+// in which they are told. A number that is not known is not exported: a scrape without it says so,
+// a zero would lie.
 class MetricsText {
  public:
   void Describe(std::string_view name, std::string_view type, std::string_view help) {
-    fmt::format_to(
-        std::back_inserter(text_), "# HELP {} {}\n# TYPE {} {}\n", name, help, name, type);
+    metrics_.push_back(
+        {std::string(name), fmt::format("# HELP {} {}\n# TYPE {} {}\n", name, help, name, type)});
   }
+  // Of a metric that was described.
   void Value(std::string_view name, std::string_view labels, double value) {
     if (!std::isfinite(value)) return;
-    fmt::format_to(std::back_inserter(text_), "{}{{{}}} {}\n", name, labels, value);
+    const auto metric = std::find_if(
+        metrics_.begin(), metrics_.end(), [&](const Metric& one) { return one.name == name; });
+    TBM_CHECK(metric != metrics_.end());
+    fmt::format_to(std::back_inserter(metric->text), "{}{{{}}} {}\n", name, labels, value);
   }
-  std::string Take() { return std::move(text_); }
+  std::string Take() const {
+    std::string text;
+    for (const Metric& metric : metrics_) text += metric.text;
+    return text;
+  }
 
  private:
-  std::string text_;
+  struct Metric {
+    std::string name;
+    std::string text;
+  };
+  std::vector<Metric> metrics_;
 };
 
 // Backslash, quote and line end are escaped, as the format wants it.

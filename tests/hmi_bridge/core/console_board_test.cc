@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <numbers>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -621,6 +622,24 @@ TEST(Metrics, AStaleDeviationIsNotExported) {
   console.Wait(500);
   EXPECT_THAT(console.board.Metrics(console.now),
               Not(HasSubstr("tbm_deviation_millimetres{direction")));
+}
+
+TEST(Metrics, AllLinesOfAMetricStandTogether) {
+  Console console;
+  console.Hear(GuidanceAt(console.now.utc));
+  console.Hear(dds::test::FullRelativePose());
+  console.Hear(dds::test::FullDeviceHealth());
+  std::istringstream lines(console.board.Metrics(console.now));
+  std::map<std::string, int> groups;
+  std::string last;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("#")) continue;
+    const std::string name = line.substr(0, line.find('{'));
+    if (name != last) ++groups[name];
+    last = name;
+  }
+  EXPECT_EQ(groups.count("tbm_age_seconds"), 1u);
+  for (const auto& [name, count] : groups) EXPECT_EQ(count, 1) << name;
 }
 
 TEST(Metrics, LabelsCannotBreakOut) {

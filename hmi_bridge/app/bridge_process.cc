@@ -1,0 +1,323 @@
+#include "hmi_bridge/app/bridge_process.h"
+
+#include <chrono>
+#include <cstddef>
+#include <mutex>
+#include <thread>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "hmi_bridge/app/answer_file.h"
+#include "hmi_bridge/app/audit_log.h"
+#include "hmi_bridge/server/console_server.h"
+#include "idl/cpp/codec.h"
+#include "idl/cpp/publisher.h"
+#include "idl/cpp/request_id.h"
+#include "idl/cpp/subscriber.h"
+#include "idl/cpp/topics.h"
+
+namespace tbm::hmi {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kTick = 200ms;
+constexpr std::int64_t kAuditLimit_bytes = 50'000'000;
+// An addressee that gets it later does not begin.
+constexpr std::chrono::seconds kCommandLives{30};
+
+std::int64_t SteadyMs(std::chrono::steady_clock::time_point at) {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(at.time_since_epoch()).count();
+}
+
+std::vector<RawChannel> AllChannels() {
+  std::vector<RawChannel> channels;
+  for (const dds::TopicRow& topic : dds::kTopics) {
+    channels.push_back({std::string(topic.name),
+                        std::string(topic.type),
+                        std::string(dds::IdlTextOf(topic.type))});
+  }
+  return channels;
+}
+
+template <class Message>
+std::size_t ChannelOf() {
+  std::size_t channel = 0;
+  while (dds::kTopics[channel].name != dds::TopicOf<Message>().name) ++channel;
+  return channel;
+}
+
+}  // namespace
+
+class BridgeProcess::Impl {
+ public:
+  Impl(ConsoleMachine machine,
+       BridgeFacts facts,
+       const PrivateFolder& state_folder,
+       dds::Participant& participant,
+       const Clock& clock)
+      : machine_id_(std::string_view(machine.machine.machine_id)),
+        participant_(participant),
+        clock_(clock),
+        channels_(AllChannels()),
+        answers_(state_folder),
+        audit_(state_folder.PathOf("audit.log"), kAuditLimit_bytes),
+        commands_(participant),
+        board_(std::move(machine), std::move(facts), Moment()) {
+    board_.own_alarms().Restore(answers_.Load());
+  }
+
+  void Listen(ConsoleServer& server) {
+    server_ = &server;
+    Hear(features_);
+    Hear(tilts_);
+    Hear(poses_);
+    Hear(health_);
+    Hear(events_);
+    Hear(observations_);
+    Hear(set_ups_);
+    Hear(shields_);
+    Hear(guidance_);
+    Hear(alarms_);
+    Hear(commands_in_);
+    Hear(replies_);
+  }
+
+  void StopListening() {
+    features_.reset();
+    tilts_.reset();
+    poses_.reset();
+    health_.reset();
+    events_.reset();
+    observations_.reset();
+    set_ups_.reset();
+    shields_.reset();
+    guidance_.reset();
+    alarms_.reset();
+    commands_in_.reset();
+    replies_.reset();
+    server_ = nullptr;
+  }
+
+  void Run(const std::stop_token& stop, const std::function<void()>& on_alive) {
+    while (!stop.stop_requested()) {
+      {
+        const std::lock_guard lock(mutex_);
+        const hmi::Moment now = Moment();
+        board_.SetNetwork(participant_.IsRunning(), now);
+        board_.Tick(now);
+      }
+      if (server_ != nullptr) server_->Notify();
+      if (on_alive) on_alive();
+      std::this_thread::sleep_for(kTick);
+    }
+  }
+
+  void Report(const dds::Alarm& alarm) {
+    const std::lock_guard lock(mutex_);
+    board_.Add(alarm, Moment());
+  }
+
+  Picture Now() {
+    const std::lock_guard lock(mutex_);
+    const hmi::Moment now = Moment();
+    return {board_.Sections(),
+            static_cast<double>(Milliseconds(now.utc)),
+            static_cast<double>(now.steady_ms)};
+  }
+
+  ApiAnswer History(const HistoryQuestion& question) {
+    const std::lock_guard lock(mutex_);
+    const auto view = board_.history().Between(question.point,
+                                               static_cast<std::int64_t>(question.from_utc_ms),
+                                               static_cast<std::int64_t>(question.to_utc_ms),
+                                               static_cast<std::size_t>(question.most));
+    return AnswerOf(question.point, view);
+  }
+
+  ApiAnswer Advance(const AdvanceQuestion& question) {
+    const std::lock_guard lock(mutex_);
+    return AnswerOf(question.point, board_.history().Back(question.point, question.length_m));
+  }
+
+  ApiAnswer Ask(const CommandRequest& request, const std::string& user, Role role) {
+    const auto asked = CommandOf(request, user, role);
+    const Timestamp now = clock_.Now();
+    if (!asked) {
+      // Who tried what they may not is of interest too; that it cannot be written changes nothing.
+      (void)audit_.Add(now, user, role, request, "refused: " + asked.error().text);
+      return asked.error();
+    }
+    dds::Command command = asked.value();
+    command.machine_id = machine_id_;
+    const std::string request_id = dds::NewRequestId();
+    command.request_id = std::string_view(request_id);
+    command.issued_at = now;
+    command.expires_at = now + kCommandLives;
+    if (!audit_.Add(now, user, role, request, "sent as " + request_id)) {
+      return ApiFault{
+          503, "cannot_send", "the audit log cannot be written, and nothing is done without it"};
+    }
+    return Send(command, request_id);
+  }
+
+  std::string Metrics() {
+    std::string text;
+    {
+      const std::lock_guard lock(mutex_);
+      text = board_.Metrics(Moment());
+    }
+    text +=
+        "# HELP tbm_samples_total of each topic, since the bridge began\n"
+        "# TYPE tbm_samples_total counter\n";
+    AppendSamples(features_, &text);
+    AppendSamples(tilts_, &text);
+    AppendSamples(poses_, &text);
+    AppendSamples(health_, &text);
+    AppendSamples(events_, &text);
+    AppendSamples(observations_, &text);
+    AppendSamples(set_ups_, &text);
+    AppendSamples(shields_, &text);
+    AppendSamples(guidance_, &text);
+    AppendSamples(alarms_, &text);
+    AppendSamples(commands_in_, &text);
+    AppendSamples(replies_, &text);
+    return text;
+  }
+
+  const std::vector<RawChannel>& Channels() const { return channels_; }
+
+ private:
+  template <class Message>
+  using Input = std::optional<dds::Subscriber<Message>>;
+
+  template <class Message>
+  static void AppendSamples(const Input<Message>& input, std::string* text) {
+    if (!input) return;
+    const dds::SubscriberCounters counters = input->counters();
+    const auto append = [&](std::string_view outcome, std::uint64_t count) {
+      *text += fmt::format("tbm_samples_total{{topic=\"{}\",outcome=\"{}\"}} {}\n",
+                           dds::TopicOf<Message>().name,
+                           outcome,
+                           count);
+    };
+    append("delivered", counters.delivered);
+    append("rejected", counters.rejected);
+    append("other_interface", counters.from_other_interface);
+    append("lost", counters.lost);
+  }
+  static_assert(dds::kTopics.size() == 12, "a new topic has to be heard");
+
+  hmi::Moment Moment() const { return {clock_.Now(), SteadyMs(clock_.Steady())}; }
+
+  template <class Message>
+  void Hear(Input<Message>& input) {
+    input.emplace(participant_, [this](const Message& message, const dds::SampleFacts& facts) {
+      const Arrival arrival{SteadyMs(facts.received_at), facts.contested};
+      if constexpr (!std::is_same_v<Message, dds::Command>) {
+        const std::lock_guard lock(mutex_);
+        board_.Add(message, arrival, Moment());
+      }
+      server_->Notify();
+      PassOn(message);
+    });
+  }
+
+  template <class Message>
+  void PassOn(const Message& message) {
+    static const std::size_t channel = ChannelOf<Message>();
+    if (!server_->HasListener(channel)) return;
+    std::vector<std::byte> bytes;
+    if (dds::EncodeCdr(message, &bytes) != dds::BoundaryFault::kNone) return;
+    server_->Publish(channel, clock_.Now(), bytes);
+  }
+
+  ApiAnswer AnswerOf(const std::string& point, const std::optional<Json>& view) const {
+    if (view) return view->dump();
+    return ApiFault{400, "unknown_point", "the machine has no point '" + point + "'"};
+  }
+
+  ApiAnswer Send(const dds::Command& command, const std::string& request_id) {
+    const bool is_own = command.addressee.view() == kOwnAddressee;
+    if (!is_own && commands_.matched_readers() == 0) {
+      return ApiFault{503,
+                      "cannot_send",
+                      fmt::format("nobody hears commands: does {} run?", command.addressee.view())};
+    }
+    // Also what the bridge does itself: so it stands in the journal.
+    const dds::WriteOutcome outcome = commands_.Write(command);
+    if (!is_own && outcome != dds::WriteOutcome::kWritten) {
+      return ApiFault{503,
+                      "cannot_send",
+                      outcome == dds::WriteOutcome::kRefused
+                          ? std::string(dds::FaultText(commands_.counters().refused_because))
+                          : "there is no network"};
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      const hmi::Moment now = Moment();
+      board_.Sent(command, now);
+      if (is_own && board_.Obey(command, now)) answers_.Keep(board_.own_alarms().answers());
+    }
+    if (server_ != nullptr) server_->Notify();
+    return Json({{"request_id", request_id}}).dump();
+  }
+
+  const dds::MachineId machine_id_;
+  dds::Participant& participant_;
+  const Clock& clock_;
+  const std::vector<RawChannel> channels_;
+  AnswerFile answers_;
+  AuditLog audit_;
+  dds::Publisher<dds::Command> commands_;
+  ConsoleServer* server_ = nullptr;
+
+  std::mutex mutex_;  // guards board_
+  ConsoleBoard board_;
+
+  Input<dds::FrameFeatures> features_;
+  Input<dds::TiltReading> tilts_;
+  Input<dds::RelativePose> poses_;
+  Input<dds::DeviceHealth> health_;
+  Input<dds::Event> events_;
+  Input<dds::StationObservation> observations_;
+  Input<dds::StationSetUp> set_ups_;
+  Input<dds::ShieldPose> shields_;
+  Input<dds::Guidance> guidance_;
+  Input<dds::AlarmStatus> alarms_;
+  Input<dds::Command> commands_in_;
+  Input<dds::CommandReply> replies_;
+};
+
+BridgeProcess::BridgeProcess(ConsoleMachine machine,
+                             BridgeFacts facts,
+                             const PrivateFolder& state_folder,
+                             dds::Participant& participant,
+                             const Clock& clock)
+    : impl_(std::make_unique<Impl>(
+          std::move(machine), std::move(facts), state_folder, participant, clock)) {}
+BridgeProcess::~BridgeProcess() = default;
+
+void BridgeProcess::Listen(ConsoleServer& server) { impl_->Listen(server); }
+void BridgeProcess::StopListening() { impl_->StopListening(); }
+void BridgeProcess::Run(const std::stop_token& stop, const std::function<void()>& on_alive) {
+  impl_->Run(stop, on_alive);
+}
+void BridgeProcess::Report(const dds::Alarm& alarm) { impl_->Report(alarm); }
+Picture BridgeProcess::Now() { return impl_->Now(); }
+ApiAnswer BridgeProcess::History(const HistoryQuestion& question) {
+  return impl_->History(question);
+}
+ApiAnswer BridgeProcess::Advance(const AdvanceQuestion& question) {
+  return impl_->Advance(question);
+}
+ApiAnswer BridgeProcess::Ask(const CommandRequest& request, const std::string& user, Role role) {
+  return impl_->Ask(request, user, role);
+}
+std::string BridgeProcess::Metrics() { return impl_->Metrics(); }
+const std::vector<RawChannel>& BridgeProcess::Channels() const { return impl_->Channels(); }
+
+}  // namespace tbm::hmi
