@@ -12,9 +12,7 @@
 #include "guidance/app/chain_check.h"
 #include "guidance/app/chain_input.h"
 #include "guidance/app/chain_report.h"
-#include "guidance/app/gnuplot.h"
 #include "guidance/app/journal_reading.h"
-#include "guidance/app/output_file.h"
 
 namespace tbm {
 namespace {
@@ -112,34 +110,6 @@ ClockFinding FindClock(const Input& input,
   return finding;
 }
 
-std::optional<std::string> ReportObstacle(const CheckRequest& request) {
-  if (request.report.empty()) return std::nullopt;
-  if (auto fault = MakeFolder(request.report)) return fault;
-  for (const char* name : {"check.csv", "check.json", "check.png"}) {
-    if (auto fault = OutputFile(request.report + "/" + name, request.force).Obstacle())
-      return fault;
-  }
-  return std::nullopt;
-}
-
-ExitCode WriteReport(const ChainFigures& figures,
-                     const CheckRequest& request,
-                     const Console& console) {
-  const std::string base = request.report + "/check.";
-  for (const auto& [ending, text] :
-       {std::pair("csv", ChainCsv(figures)), std::pair("json", ChainJson(figures, request))}) {
-    if (const auto fault = OutputFile(base + ending, request.force).Write(text)) {
-      Complain(console, *fault);
-      return ExitCode::kBadInput;
-    }
-  }
-  // The figures are complete without the picture.
-  if (const auto fault = DrawPicture(ChainPlot(figures), 1000, 1100, base + "png", request.force)) {
-    Complain(console, *fault);
-  }
-  return ExitCode::kDone;
-}
-
 ExitCode Refuse(const Console& console, const std::string& why) {
   Complain(console, why);
   return ExitCode::kBadInput;
@@ -185,7 +155,8 @@ ExitCode RunChainCheck(const CheckRequest& request, const Console& console) {
   figures.other_points = input->other_points;
   console.out << ChainText(figures, request);
   if (request.report.empty()) return ExitCode::kDone;
-  return WriteReport(figures, request, console);
+  return WriteReport(
+      {ChainCsv(figures), ChainJson(figures, request), ChainPlot(figures), 1100}, request, console);
 }
 
 }  // namespace tbm

@@ -10,7 +10,6 @@ namespace tbm {
 namespace {
 
 constexpr double kMmPerM = 1e3;
-constexpr std::array<const char*, 4> kQuantities = {"dx", "dy", "dz", "distance"};
 
 double OverSigma(const ChainObservation& one) { return one.difference_m().norm() / one.sigma_m; }
 
@@ -31,19 +30,20 @@ std::string ClockAhead(const ClockEstimate& clock) {
 ChainFigures FiguresOf(ChainPairs pairs) {
   ChainFigures figures;
   figures.pairs = std::move(pairs);
-  std::array<std::vector<double>, 4> values_mm;
   for (const ChainObservation& one : figures.pairs.observations) {
-    const Eigen::Vector3d d_mm = kMmPerM * one.difference_m();
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      values_mm[axis].push_back(d_mm(static_cast<Eigen::Index>(axis)));
-    }
-    values_mm[3].push_back(d_mm.norm());
     if (one.IsInside95()) ++figures.inside_95;
     figures.mean_standardised_2 +=
         one.standardised_2 / static_cast<double>(figures.pairs.observations.size());
   }
-  for (std::size_t i = 0; i < 4; ++i) figures.spreads[i] = SpreadOf(values_mm[i]);
   return figures;
+}
+
+Spreads ChainFigures::spreads() const {
+  std::vector<Eigen::Vector3d> differences_mm;
+  for (const ChainObservation& one : pairs.observations) {
+    differences_mm.push_back(kMmPerM * one.difference_m());
+  }
+  return Spreads(differences_mm);
 }
 
 std::string ClockText(const ClockFinding& clock) {
@@ -90,16 +90,7 @@ std::string ChainText(const ChainFigures& figures, const CheckRequest& request) 
                         OverSigma(one),
                         one.IsInside95() ? "in" : "out");
   }
-  text += fmt::format("\n{:>10} {:>9} {:>9} {:>9} {:>9}\n", "mm", "mean", "RMS", "95 %", "max");
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Spread& s = figures.spreads[i];
-    text += fmt::format("{:>10} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f}\n",
-                        kQuantities[i],
-                        s.mean_mm,
-                        s.rms_mm,
-                        s.p95_mm,
-                        s.max_mm);
-  }
+  text += figures.spreads().Text();
   return text + fmt::format(
                     "\ninside the published 95 % ellipsoid: {} of {} ({:.1f} %); squared "
                     "distance in sigmas {:.2f} on average, 3 is right\n",
@@ -160,11 +151,7 @@ std::string ChainJson(const ChainFigures& figures, const CheckRequest& request) 
   clock["applied"] = figures.clock.is_applied;
   clock["text"] = ClockText(figures.clock);
   json["clock"] = clock;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Spread& s = figures.spreads[i];
-    json[kQuantities[i]] = {
-        {"mean_mm", s.mean_mm}, {"rms_mm", s.rms_mm}, {"p95_mm", s.p95_mm}, {"max_mm", s.max_mm}};
-  }
+  figures.spreads().AddTo(&json);
   json["inside_95"] = figures.inside_95;
   json["inside_95_percent"] = InsidePercent(figures);
   json["mean_standardised_squared"] = figures.mean_standardised_2;
@@ -185,40 +172,18 @@ std::string ChainPlot(const ChainFigures& figures) {
                           std::sqrt(observations[i].standardised_2));
   }
   script += "EOD\n";
-  script += fmt::format(
-      "set multiplot layout 5,1 title 'tbm check: guidance against {} independent shots, {:.1f} % "
-      "inside the published 95 % ellipsoid' offset 0,-0.2\n",
-      observations.size(),
-      InsidePercent(figures));
-  script += fmt::format(
-      "set grid\nset key outside right top\nset xrange [0.5:{}.5]\nset xtics format '%g'\n"
-      "set lmargin 10\nset rmargin 26\nset zeroaxis lt -1 lc rgb '#888888'\n"
-      "set offsets 0,0,graph 0.08,graph 0.08\n",
-      observations.size());
-  const std::array<const char*, 4> colours = {"#c0392b", "#27803f", "#1f5fa8", "#333333"};
-  const char* style = observations.size() > 100 ? "with points pt 7 ps 0.4" : "with impulses lw 3";
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Spread& s = figures.spreads[i];
-    script += fmt::format("set ylabel '{} mm'\n", kQuantities[i]);
-    if (i == 3) script += "set yrange [0:*]\n";
-    script += fmt::format(
-        "plot $data using 1:{} {} lc rgb '{}' title '{}', {:.5f} lc rgb '{}' dt 2 title 'mean "
-        "{:.2f}', {:.5f} lc rgb '#e08000' dt 3 title 'RMS {:.2f}'\n",
-        i + 2,
-        style,
-        colours[i],
-        kQuantities[i],
-        s.mean_mm,
-        colours[i],
-        s.mean_mm,
-        s.rms_mm,
-        s.rms_mm);
-  }
+  script += PanelsScript(figures.spreads(),
+                         observations.size(),
+                         5,
+                         fmt::format("tbm check: guidance against {} independent shots, {:.1f} % "
+                                     "inside the published 95 % ellipsoid",
+                                     observations.size(),
+                                     InsidePercent(figures)));
   script += fmt::format(
       "set ylabel 'in sigmas'\nset xlabel 'observation'\nplot $data using 1:6 {} lc rgb '#8030a0' "
       "title 'distance in sigmas', 2.7955 lc rgb '#c0392b' dt 4 title '95 %'\n",
-      style);
-  return script + "unset multiplot\n";
+      PanelStyle(observations.size()));
+  return script + std::string(kPanelsEnd);
 }
 
 }  // namespace tbm

@@ -1,13 +1,11 @@
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "guidance/app/accuracy.h"
 #include "guidance/app/chain_check.h"
 #include "guidance/app/check_command.h"
+#include "guidance/app/check_report.h"
 
 namespace tbm {
 
@@ -21,10 +19,11 @@ struct ClockFinding {
 struct ChainFigures {
   ChainPairs pairs;
   ClockFinding clock;
-  std::size_t other_points = 0;   // shots at points that guidance does not know
-  std::array<Spread, 4> spreads;  // dx dy dz distance
+  std::size_t other_points = 0;  // shots at points that guidance does not know
   std::size_t inside_95 = 0;
   double mean_standardised_2 = 0.0;  // 3 when the sigmas are what the errors are
+
+  Spreads spreads() const;
 };
 
 ChainFigures FiguresOf(ChainPairs pairs);

@@ -8,8 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "guidance/app/accuracy.h"
-#include "guidance/app/gnuplot.h"
-#include "guidance/app/output_file.h"
+#include "guidance/app/check_report.h"
 
 namespace tbm {
 namespace {
@@ -17,23 +16,20 @@ namespace {
 struct Figures {
   Pairs pairs;
   std::optional<Alignment> alignment;
-  std::array<Spread, 4> spreads;  // dx dy dz distance
+
+  Spreads spreads() const {
+    std::vector<Eigen::Vector3d> differences_mm;
+    for (const Observation& observation : pairs.observations) {
+      differences_mm.push_back(observation.difference_mm());
+    }
+    return Spreads(differences_mm);
+  }
 };
-constexpr std::array<const char*, 4> kQuantities = {"dx", "dy", "dz", "distance"};
 
 Figures FiguresOf(Pairs pairs, bool align_rigid) {
   Figures figures;
   figures.pairs = std::move(pairs);
   if (align_rigid) figures.alignment = AlignRigid(figures.pairs);
-  std::array<std::vector<double>, 4> values;
-  for (const Observation& observation : figures.pairs.observations) {
-    const Eigen::Vector3d d = observation.difference_mm();
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      values[axis].push_back(d(static_cast<Eigen::Index>(axis)));
-    }
-    values[3].push_back(d.norm());
-  }
-  for (std::size_t i = 0; i < 4; ++i) figures.spreads[i] = SpreadOf(values[i]);
   return figures;
 }
 
@@ -78,16 +74,7 @@ std::string PrintedText(const Figures& figures, const CheckRequest& request) {
                         d.z(),
                         d.norm());
   }
-  text += fmt::format("\n{:>10} {:>9} {:>9} {:>9} {:>9}\n", "mm", "mean", "RMS", "95 %", "max");
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Spread& s = figures.spreads[i];
-    text += fmt::format("{:>10} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f}\n",
-                        kQuantities[i],
-                        s.mean_mm,
-                        s.rms_mm,
-                        s.p95_mm,
-                        s.max_mm);
-  }
+  text += figures.spreads().Text();
   return text;
 }
 
@@ -136,15 +123,10 @@ std::string JsonText(const Figures& figures, const CheckRequest& request) {
                                {"ty_mm", t.y()},
                                {"tz_mm", t.z()}};
   }
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Spread& s = figures.spreads[i];
-    json[kQuantities[i]] = {
-        {"mean_mm", s.mean_mm}, {"rms_mm", s.rms_mm}, {"p95_mm", s.p95_mm}, {"max_mm", s.max_mm}};
-  }
+  figures.spreads().AddTo(&json);
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
-// Four panels over the observations, each with its mean and, for the distance, RMS and 95 %.
 std::string PlotScript(const Figures& figures, const CheckRequest& request) {
   std::string script = "$data << EOD\n";
   const auto& observations = figures.pairs.observations;
@@ -153,67 +135,14 @@ std::string PlotScript(const Figures& figures, const CheckRequest& request) {
     script += fmt::format("{} {:.5f} {:.5f} {:.5f} {:.5f}\n", i + 1, d.x(), d.y(), d.z(), d.norm());
   }
   script += "EOD\n";
-  script += fmt::format(
-      "set multiplot layout 4,1 title 'tbm check: {}, {} observations, {} [mm]' offset 0,-0.2\n",
-      request.point,
-      observations.size(),
-      figures.alignment ? "aligned" : "not aligned");
-  script += fmt::format(
-      "set grid\nset key outside right top\nset xrange [0.5:{}.5]\nset xtics format '%g'\n"
-      "set lmargin 10\nset rmargin 26\nset zeroaxis lt -1 lc rgb '#888888'\n"
-      "set offsets 0,0,graph 0.08,graph 0.08\n",
-      observations.size());
-  const std::array<const char*, 4> colours = {"#c0392b", "#27803f", "#1f5fa8", "#333333"};
-  const char* style = observations.size() > 100 ? "with points pt 7 ps 0.4" : "with impulses lw 3";
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Spread& s = figures.spreads[i];
-    script += fmt::format("set ylabel '{} mm'\n", kQuantities[i]);
-    if (i == 3) script += "set xlabel 'observation'\nset yrange [0:*]\n";
-    script += fmt::format(
-        "plot $data using 1:{} {} lc rgb '{}' title '{}', {:.5f} lc rgb '{}' dt 2 title 'mean "
-        "{:.2f}'",
-        i + 2,
-        style,
-        colours[i],
-        kQuantities[i],
-        s.mean_mm,
-        colours[i],
-        s.mean_mm);
-    script += fmt::format(", {:.5f} lc rgb '#e08000' dt 3 title 'RMS {:.2f}'", s.rms_mm, s.rms_mm);
-    if (i == 3)
-      script +=
-          fmt::format(", {:.5f} lc rgb '#8030a0' dt 4 title '95 % {:.2f}'", s.p95_mm, s.p95_mm);
-    script += fmt::format(", NaN lc rgb '#ffffff' title 'max {:.2f}'\n", s.max_mm);
-  }
-  return script + "unset multiplot\n";
-}
-
-// Everything that would stop the report is found before anything of it is written.
-std::optional<std::string> ReportObstacle(const CheckRequest& request) {
-  if (request.report.empty()) return std::nullopt;
-  if (auto fault = MakeFolder(request.report)) return fault;
-  for (const char* name : {"check.csv", "check.json", "check.png"}) {
-    if (auto fault = OutputFile(request.report + "/" + name, request.force).Obstacle())
-      return fault;
-  }
-  return std::nullopt;
-}
-
-ExitCode WriteReport(const Figures& figures, const CheckRequest& request, const Console& console) {
-  const std::string base = request.report + "/check.";
-  for (const auto& [ending, text] :
-       {std::pair("csv", CsvText(figures)), std::pair("json", JsonText(figures, request))}) {
-    if (const auto fault = OutputFile(base + ending, request.force).Write(text)) {
-      Complain(console, *fault);
-      return ExitCode::kBadInput;
-    }
-  }
-  // The figures are complete without the picture.
-  if (const auto fault =
-          DrawPicture(PlotScript(figures, request), 1000, 900, base + "png", request.force)) {
-    Complain(console, *fault);
-  }
-  return ExitCode::kDone;
+  script += PanelsScript(figures.spreads(),
+                         observations.size(),
+                         4,
+                         fmt::format("tbm check: {}, {} observations, {} [mm]",
+                                     request.point,
+                                     observations.size(),
+                                     figures.alignment ? "aligned" : "not aligned"));
+  return script + std::string(kPanelsEnd);
 }
 
 Result<Pairs, std::string> ReadPairs(const CheckRequest& request, const Console& console) {
@@ -267,7 +196,9 @@ ExitCode RunCheck(const CheckRequest& request, const Console& console) {
   const Figures figures = FiguresOf(std::move(pairs).value(), request.align_rigid);
   console.out << PrintedText(figures, request);
   if (request.report.empty()) return ExitCode::kDone;
-  return WriteReport(figures, request, console);
+  return WriteReport({CsvText(figures), JsonText(figures, request), PlotScript(figures, request)},
+                     request,
+                     console);
 }
 
 }  // namespace tbm
