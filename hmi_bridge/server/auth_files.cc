@@ -70,7 +70,8 @@ class Row {
     return {fault_.empty() ? json_[key] : json_, place_ + "." + key};
   }
   void Wrong(std::string_view key, std::string_view what) {
-    if (fault_.empty()) fault_ = fmt::format("{}{}{} {}", place_, key.empty() ? "" : ".", key, what);
+    if (fault_.empty())
+      fault_ = fmt::format("{}{}{} {}", place_, key.empty() ? "" : ".", key, what);
   }
   const std::string& fault() const { return fault_; }
 
@@ -205,8 +206,7 @@ Result<std::vector<User>, std::string> ParseUsers(std::string_view text, const s
         if (!names.insert(user.name).second) row.Wrong("name", "is there twice");
         Row scrypt = row.In("scrypt");
         scrypt.Keys({"log2_n", "r", "p", "salt", "key"});
-        user.password.log2_n =
-            static_cast<int>(scrypt.Integer("log2_n", kLeastLog2N, kMostLog2N));
+        user.password.log2_n = static_cast<int>(scrypt.Integer("log2_n", kLeastLog2N, kMostLog2N));
         user.password.r = static_cast<int>(scrypt.Integer("r", 1, 8));
         user.password.p = static_cast<int>(scrypt.Integer("p", 1, 4));
         user.password.salt = scrypt.Bytes("salt", 16);
@@ -217,43 +217,40 @@ Result<std::vector<User>, std::string> ParseUsers(std::string_view text, const s
 
 Result<std::vector<Session>, std::string> ParseSessions(std::string_view text,
                                                         const std::string& file) {
-  return ReadList<Session>(text,
-                           file,
-                           "sessions",
-                           "Remove it: everybody then has to log in again.",
-                           [](Row& row, Session& session) -> std::string {
-                             row.Keys({"token_sha256",
-                                       "user",
-                                       "edition",
-                                       "created_utc_ms",
-                                       "used_utc_ms"});
-                             session.token_sha256 = Hex(row.Bytes("token_sha256", 32));
-                             session.user = row.Name("user");
-                             session.edition = Hex(row.Bytes("edition", 8));
-                             session.created_utc_ms = row.Integer("created_utc_ms", 0, kMost_utc_ms);
-                             session.used_utc_ms = row.Integer("used_utc_ms", 0, kMost_utc_ms);
-                             return row.fault();
-                           });
+  return ReadList<Session>(
+      text,
+      file,
+      "sessions",
+      "Remove it: everybody then has to log in again.",
+      [](Row& row, Session& session) -> std::string {
+        row.Keys({"token_sha256", "user", "edition", "created_utc_ms", "used_utc_ms"});
+        session.token_sha256 = Hex(row.Bytes("token_sha256", 32));
+        session.user = row.Name("user");
+        session.edition = Hex(row.Bytes("edition", 8));
+        session.created_utc_ms = row.Integer("created_utc_ms", 0, kMost_utc_ms);
+        session.used_utc_ms = row.Integer("used_utc_ms", 0, kMost_utc_ms);
+        return row.fault();
+      });
 }
 
 Result<std::vector<ReadToken>, std::string> ParseReadTokens(std::string_view text,
                                                             const std::string& file) {
   std::set<std::string> names;
-  return ReadList<ReadToken>(
-      text,
-      file,
-      "tokens",
-      "Put a copy of it back, or remove it and make the tokens anew.",
-      [&](Row& row, ReadToken& token) -> std::string {
-        row.Keys({"token_sha256", "name", "created_utc_ms"});
-        token.token_sha256 = Hex(row.Bytes("token_sha256", 32));
-        token.name = row.Name("name");
-        token.created_utc_ms = row.Integer("created_utc_ms", 0, kMost_utc_ms);
-        if (row.fault().empty() && !names.insert(token.name).second) {
-          row.Wrong("name", "is there twice");
-        }
-        return row.fault();
-      });
+  return ReadList<ReadToken>(text,
+                             file,
+                             "tokens",
+                             "Put a copy of it back, or remove it and make the tokens anew.",
+                             [&](Row& row, ReadToken& token) -> std::string {
+                               row.Keys({"token_sha256", "name", "created_utc_ms"});
+                               token.token_sha256 = Hex(row.Bytes("token_sha256", 32));
+                               token.name = row.Name("name");
+                               token.created_utc_ms =
+                                   row.Integer("created_utc_ms", 0, kMost_utc_ms);
+                               if (row.fault().empty() && !names.insert(token.name).second) {
+                                 row.Wrong("name", "is there twice");
+                               }
+                               return row.fault();
+                             });
 }
 
 }  // namespace tbm::hmi

@@ -82,13 +82,16 @@ std::optional<std::string> WhyNotPassword(std::string_view name, std::string_vie
   // What is left of it without such words, the name and digits is what there is to guess.
   std::string rest = lower;
   const auto take_out = [&rest](std::string_view word) {
-    for (auto at = rest.find(word); !word.empty() && at != std::string::npos; at = rest.find(word)) {
+    for (auto at = rest.find(word); !word.empty() && at != std::string::npos;
+         at = rest.find(word)) {
       rest.erase(at, word.size());
     }
   };
   take_out(Lower(name));
   for (const std::string_view word : kSilly) take_out(word);
-  const auto is_hard = [](char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0 || c < 0; };
+  const auto is_hard = [](char c) {
+    return std::isalpha(static_cast<unsigned char>(c)) != 0 || c < 0;
+  };
   if (rest.size() < lower.size() && std::count_if(rest.begin(), rest.end(), is_hard) < 4) {
     return "the password is the name, or one of those that are tried first";
   }
@@ -190,7 +193,8 @@ Result<std::optional<FirstUser>, std::string> AuthStore::MakeFirstUser() {
   // First the password, then the user: the other way round a power cut between the two would leave
   // a user whom nobody can be.
   if (auto fault = folder_.Write(kFirstPasswordFile, first.password + "\n")) return Failure{*fault};
-  const User user{first.name, Role::kSurveyor, NewEdition(), HashOf(first.password, limits_.log2_n)};
+  const User user{
+      first.name, Role::kSurveyor, NewEdition(), HashOf(first.password, limits_.log2_n)};
   const auto fault = Alter(users_, [&](std::vector<User>& users) -> std::optional<std::string> {
     if (!users.empty()) return "another process has just made the first user";
     users.push_back(user);
@@ -265,8 +269,9 @@ std::vector<AuthStore::ListedUser> AuthStore::ListUsers() {
   DropWorthless(open);
   std::vector<ListedUser> list;
   for (const User& user : users_.rows) {
-    const auto count = std::count_if(
-        open.begin(), open.end(), [&](const Session& session) { return session.user == user.name; });
+    const auto count = std::count_if(open.begin(), open.end(), [&](const Session& session) {
+      return session.user == user.name;
+    });
     list.push_back({user.name, user.role, static_cast<std::size_t>(count)});
   }
   return list;
@@ -277,12 +282,15 @@ Result<std::string, std::string> AuthStore::AddToken(const std::string& name) {
     return Failure{std::string("a name has 1 to 32 letters, digits, '.', '_' or '-'")};
   }
   const std::string token = RandomToken(kTokenBytes);
-  const auto fault = Alter(tokens_, [&](std::vector<ReadToken>& tokens) -> std::optional<std::string> {
-    if (Named(tokens, name) != tokens.end()) return fmt::format("token '{}' is there already", name);
-    if (tokens.size() >= kMostUsers) return fmt::format("there are {} tokens already", kMostUsers);
-    tokens.push_back({Sha256Hex(token), name, Now_utc_ms()});
-    return std::nullopt;
-  });
+  const auto fault =
+      Alter(tokens_, [&](std::vector<ReadToken>& tokens) -> std::optional<std::string> {
+        if (Named(tokens, name) != tokens.end())
+          return fmt::format("token '{}' is there already", name);
+        if (tokens.size() >= kMostUsers)
+          return fmt::format("there are {} tokens already", kMostUsers);
+        tokens.push_back({Sha256Hex(token), name, Now_utc_ms()});
+        return std::nullopt;
+      });
   if (fault) return Failure{*fault};
   return token;
 }
@@ -366,20 +374,21 @@ Result<std::optional<OpenedSession>, std::string> AuthStore::LogIn(const std::st
   const std::int64_t now = Now_utc_ms();
   const Session session{Sha256Hex(opened.token), name, edition, now, now};
   bool is_still_so = true;
-  const auto fault = Alter(sessions_, [&](std::vector<Session>& rows) -> std::optional<std::string> {
-    DropWorthless(rows);
-    const User* user = FindUser(name);
-    is_still_so = user != nullptr && user->edition == edition;
-    if (!is_still_so) return "";
-    opened.identity = {name, user->role, false, session.token_sha256, ExpiresAt(session)};
-    while (rows.size() >= limits_.sessions) {
-      rows.erase(std::min_element(rows.begin(), rows.end(), [](const auto& a, const auto& b) {
-        return a.used_utc_ms < b.used_utc_ms;
-      }));
-    }
-    rows.push_back(session);
-    return std::nullopt;
-  });
+  const auto fault =
+      Alter(sessions_, [&](std::vector<Session>& rows) -> std::optional<std::string> {
+        DropWorthless(rows);
+        const User* user = FindUser(name);
+        is_still_so = user != nullptr && user->edition == edition;
+        if (!is_still_so) return "";
+        opened.identity = {name, user->role, false, session.token_sha256, ExpiresAt(session)};
+        while (rows.size() >= limits_.sessions) {
+          rows.erase(std::min_element(rows.begin(), rows.end(), [](const auto& a, const auto& b) {
+            return a.used_utc_ms < b.used_utc_ms;
+          }));
+        }
+        rows.push_back(session);
+        return std::nullopt;
+      });
   if (!is_still_so) return std::optional<OpenedSession>();
   if (fault) return Failure{*fault};
   return std::optional<OpenedSession>(std::move(opened));

@@ -247,9 +247,7 @@ void ConsoleServer::Stop() {
   core_->context.reset();
 }
 
-std::uint16_t ConsoleServer::port(std::size_t index) const {
-  return core_->ports.at(index);
-}
+std::uint16_t ConsoleServer::port(std::size_t index) const { return core_->ports.at(index); }
 
 void ConsoleServer::Notify() {
   const std::shared_lock lock(core_->running);
@@ -269,8 +267,7 @@ void ConsoleServer::Publish(std::size_t channel, Timestamp at, std::span<const s
   if (!HasListener(channel)) return;
   const std::shared_lock lock(core_->running);
   if (!core_->is_running) return;
-  const auto sample =
-      std::make_shared<const Sample>(Sample{channel, at, {cdr.begin(), cdr.end()}});
+  const auto sample = std::make_shared<const Sample>(Sample{channel, at, {cdr.begin(), cdr.end()}});
   for (const auto& socket : core_->shared.Sockets()) socket->Offer(sample);
 }
 

@@ -17,7 +17,7 @@ enum class Role { kViewer, kOperator, kSurveyor };
 
 // One part of what consoles show (openapi.yaml, `Sections`), made into text once for all of them.
 struct Section {
-  std::string_view name;  // outlives the source
+  std::string_view name;      // outlives the source
   std::uint64_t version = 0;  // grows with each change; 0: there is nothing yet
   std::shared_ptr<const std::string> json;
 };

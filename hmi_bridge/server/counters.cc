@@ -25,13 +25,11 @@ std::string Counters::Text() const {
   const auto head = [&text](std::string_view name, std::string_view type, std::string_view help) {
     text += fmt::format("# HELP {0} {2}\n# TYPE {0} {1}\n", name, type, help);
   };
-  const auto put = [&](std::string_view name,
-                       std::string_view type,
-                       std::string_view help,
-                       auto value) {
-    head(name, type, help);
-    text += fmt::format("{} {}\n", name, value);
-  };
+  const auto put =
+      [&](std::string_view name, std::string_view type, std::string_view help, auto value) {
+        head(name, type, help);
+        text += fmt::format("{} {}\n", name, value);
+      };
   put("tbm_hmi_connections", "gauge", "TCP connections that are open", connections.load());
   head("tbm_hmi_clients", "gauge", "WebSocket clients");
   text += fmt::format("tbm_hmi_clients{{kind=\"live\"}} {}\n", live_clients.load());
@@ -52,7 +50,8 @@ std::string Counters::Text() const {
   text += fmt::format("tbm_hmi_logins_total{{outcome=\"wrong\"}} {}\n", logins_wrong.load());
   head("tbm_hmi_refused_total", "counter", "requests and connections refused");
   for (std::size_t i = 0; i < kRefusals; ++i) {
-    text += fmt::format("tbm_hmi_refused_total{{reason=\"{}\"}} {}\n", kWords[i], refused[i].load());
+    text +=
+        fmt::format("tbm_hmi_refused_total{{reason=\"{}\"}} {}\n", kWords[i], refused[i].load());
   }
   return text;
 }

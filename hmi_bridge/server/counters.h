@@ -11,8 +11,8 @@ namespace tbm::hmi {
 // Why somebody was not served.
 enum class Refusal {
   kTooManyConnections,
-  kTimeout,          // slow at asking, at taking, or silent
-  kMalformed,        // no HTTP, or more of it than is taken
+  kTimeout,    // slow at asking, at taking, or silent
+  kMalformed,  // no HTTP, or more of it than is taken
   kForeignHost,
   kForeignOrigin,
   kNotLoggedIn,

@@ -39,11 +39,10 @@ const Json& List(const Json& operation, const char* key) {
 }  // namespace
 
 std::string FoxgloveServerInfo(std::string_view name, std::string_view session_id) {
-  return fmt::format(
-      R"({{"op":"serverInfo","name":{},"capabilities":[],"supportedEncodings":[],)"
-      R"("metadata":{{}},"sessionId":{}}})",
-      Quoted(name),
-      Quoted(session_id));
+  return fmt::format(R"({{"op":"serverInfo","name":{},"capabilities":[],"supportedEncodings":[],)"
+                     R"("metadata":{{}},"sessionId":{}}})",
+                     Quoted(name),
+                     Quoted(session_id));
 }
 
 std::string FoxgloveAdvertise(const std::vector<RawChannel>& channels) {
@@ -79,9 +78,8 @@ FoxgloveSubscriptions::Outcome FoxgloveSubscriptions::TakeText(std::string_view 
       outcome.answers.push_back(FoxgloveStatus(kWarning, what));
     }
   };
-  const Json operation = NestsDeeperThan(text, 8)
-                             ? Json()
-                             : Json::parse(text.begin(), text.end(), nullptr, false);
+  const Json operation =
+      NestsDeeperThan(text, 8) ? Json() : Json::parse(text.begin(), text.end(), nullptr, false);
   if (!operation.is_object() || !operation.contains("op") || !operation["op"].is_string()) {
     tell("not understood: no JSON object with op");
     return outcome;

@@ -82,14 +82,13 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
     Limit(*parser_, limits());
     if (buffer_.size() > 0) return ReadRequest();
     CloseAfter(patience);
-    stream_.async_read_some(
-        buffer_.prepare(4096),
-        [self = shared_from_this()](error_code error, std::size_t bytes) {
-          if (error) return self->Close();
-          self->is_idle_ = false;
-          self->buffer_.commit(bytes);
-          self->ReadRequest();
-        });
+    stream_.async_read_some(buffer_.prepare(4096),
+                            [self = shared_from_this()](error_code error, std::size_t bytes) {
+                              if (error) return self->Close();
+                              self->is_idle_ = false;
+                              self->buffer_.commit(bytes);
+                              self->ReadRequest();
+                            });
   }
 
   void ReadRequest() {
@@ -141,14 +140,13 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
     CloseAfter(limits().answer);
     const std::array<asio::const_buffer, 2> parts = {
         asio::buffer(head_), body_ ? asio::buffer(*body_) : asio::const_buffer()};
-    asio::async_write(
-        stream_, parts, [self = shared_from_this()](error_code error, std::size_t) {
-          self->body_.reset();
-          if (error) return self->Close();
-          if (!self->keeps_alive_) return self->Linger();
-          self->is_idle_ = true;
-          self->AwaitRequest(self->limits().idle);
-        });
+    asio::async_write(stream_, parts, [self = shared_from_this()](error_code error, std::size_t) {
+      self->body_.reset();
+      if (error) return self->Close();
+      if (!self->keeps_alive_) return self->Linger();
+      self->is_idle_ = true;
+      self->AwaitRequest(self->limits().idle);
+    });
   }
 
   void Linger() {
@@ -181,7 +179,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   std::size_t lingered_ = 0;
   bool is_head_ = false;
   bool keeps_alive_ = false;
-  bool is_idle_ = false;       // between requests: nobody is slow
+  bool is_idle_ = false;  // between requests: nobody is slow
   bool is_lingering_ = false;
 };
 

@@ -22,9 +22,9 @@ struct Peer {
 struct Request {
   std::string method;
   std::string target;
-  bool is_upgrade = false;      // asks for a WebSocket
+  bool is_upgrade = false;  // asks for a WebSocket
   bool is_keep_alive = false;
-  bool has_one_host = true;     // two would be two opinions
+  bool has_one_host = true;  // two would be two opinions
   bool has_transfer_encoding = false;
   std::string host;
   std::string origin;
@@ -34,8 +34,8 @@ struct Request {
   std::string content_type;
   std::string accept_encoding;
   std::string if_none_match;
-  std::string fetch_site;       // Sec-Fetch-Site
-  std::string subprotocols;     // Sec-WebSocket-Protocol
+  std::string fetch_site;    // Sec-Fetch-Site
+  std::string subprotocols;  // Sec-WebSocket-Protocol
   std::string body;
   Peer peer;
 

@@ -17,9 +17,8 @@ const std::string& LiveFeed::Next(const Picture& picture) {
   bool is_first = true;
   for (const Section& section : picture.sections) {
     if (section.version == 0 || section.json == nullptr) continue;
-    auto sent = std::find_if(sent_.begin(), sent_.end(), [&](const auto& entry) {
-      return entry.first == section.name;
-    });
+    auto sent = std::find_if(
+        sent_.begin(), sent_.end(), [&](const auto& entry) { return entry.first == section.name; });
     if (sent == sent_.end()) sent = sent_.insert(sent_.end(), {section.name, 0});
     // Versions only grow: a picture that was taken earlier brings nothing back.
     if (section.version <= sent->second) continue;

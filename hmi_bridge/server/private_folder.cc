@@ -122,8 +122,7 @@ std::optional<std::string> PrivateFolder::Write(std::string_view name,
   if (descriptor < 0) return Sentence(beside, "cannot be made", errno);
   int error = WriteAll(descriptor, text);
   const bool is_for_another = ::geteuid() == 0 && folder.st_uid != 0;
-  if (error == 0 && is_for_another &&
-      ::fchown(descriptor, folder.st_uid, folder.st_gid) != 0) {
+  if (error == 0 && is_for_another && ::fchown(descriptor, folder.st_uid, folder.st_gid) != 0) {
     error = errno;
   }
   if (error == 0 && ::fsync(descriptor) != 0) error = errno;

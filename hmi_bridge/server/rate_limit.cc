@@ -37,16 +37,18 @@ void RateLimit::MakeRoom(SteadyTime now) {
   std::erase_if(full_at_, [now](const auto& entry) { return entry.second <= now; });
   if (full_at_.size() < most_keys_) return;
   // The one who has asked least is forgotten: those who ask most are not let off by a crowd.
-  full_at_.erase(std::min_element(full_at_.begin(),
-                                  full_at_.end(),
-                                  [](const auto& a, const auto& b) { return a.second < b.second; }));
+  full_at_.erase(
+      std::min_element(full_at_.begin(), full_at_.end(), [](const auto& a, const auto& b) {
+        return a.second < b.second;
+      }));
 }
 
 std::string RateKey(const std::string& address) {
   std::array<unsigned char, 16> bytes{};
   if (inet_pton(AF_INET6, address.c_str(), bytes.data()) != 1) return address;
-  const bool is_mapped = std::all_of(bytes.begin(), bytes.begin() + 10, [](auto b) { return b == 0; }) &&
-                         bytes[10] == 0xff && bytes[11] == 0xff;
+  const bool is_mapped =
+      std::all_of(bytes.begin(), bytes.begin() + 10, [](auto b) { return b == 0; }) &&
+      bytes[10] == 0xff && bytes[11] == 0xff;
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   return is_mapped ? address.substr(address.rfind(':') + 1) : Hex(text.substr(0, 8)) + "/64";
 }

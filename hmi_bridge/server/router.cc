@@ -208,8 +208,7 @@ Routed Router::Login(const Request& request) {
     Tell({ServerEvent::What::kLoginLimited, ForLog(login->name), request.peer.address, ""});
     return TooMany("too many log-ins tried; wait", *wait);
   }
-  return Later{Later::Where::kHashing,
-               [this, login = *login, request, by_address, by_name] {
+  return Later{Later::Where::kHashing, [this, login = *login, request, by_address, by_name] {
                  Response response = FinishLogin(login.name, login.password, request);
                  if (response.status == 200) {
                    const std::lock_guard lock(mutex_);

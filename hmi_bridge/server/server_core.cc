@@ -30,9 +30,8 @@ std::shared_ptr<ServerShared::Place> ServerShared::Admit(const std::string& addr
   const std::lock_guard lock(mutex_);
   const auto found = by_address_.find(key);
   const std::size_t of_address = found == by_address_.end() ? 0 : found->second;
-  const bool is_full =
-      connections_ >= options.limits.connections ||
-      (!is_loopback && of_address >= options.limits.connections_per_address);
+  const bool is_full = connections_ >= options.limits.connections ||
+                       (!is_loopback && of_address >= options.limits.connections_per_address);
   if (is_full) {
     counters.Refuse(Refusal::kTooManyConnections);
     return nullptr;

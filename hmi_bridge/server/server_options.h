@@ -27,15 +27,15 @@ struct ServerLimits {
   std::size_t connections_per_address = 64;  // loopback: all
   std::size_t header_bytes = 8 * 1024;
   std::size_t body_bytes = 16 * 1024;
-  std::size_t live_client_bytes = 4 * 1024;      // in one message of a console
+  std::size_t live_client_bytes = 4 * 1024;  // in one message of a console
   std::size_t foxglove_client_bytes = 16 * 1024;
-  std::size_t waiting_samples = 256;             // for one tool
+  std::size_t waiting_samples = 256;  // for one tool
   std::size_t waiting_bytes = 2 * 1024 * 1024;
-  std::chrono::milliseconds request{10'000};     // from its first byte to its last, TLS' included
-  std::chrono::milliseconds idle{30'000};        // between requests
-  std::chrono::milliseconds answer{30'000};      // to take all of an answer
-  std::chrono::milliseconds write{10'000};       // to take one message
-  std::chrono::milliseconds silence{20'000};     // without any sign; asked for one at half of it
+  std::chrono::milliseconds request{10'000};  // from its first byte to its last, TLS' included
+  std::chrono::milliseconds idle{30'000};     // between requests
+  std::chrono::milliseconds answer{30'000};   // to take all of an answer
+  std::chrono::milliseconds write{10'000};    // to take one message
+  std::chrono::milliseconds silence{20'000};  // without any sign; asked for one at half of it
   std::chrono::milliseconds live_period{100};
   std::chrono::milliseconds heartbeat{1'000};
   int logins_at_once = 5;
@@ -67,7 +67,7 @@ std::string_view Word(ServerEvent::What what);
 struct ServerOptions {
   std::vector<ListenAddress> listen = {{}};
   std::optional<TlsFiles> tls;
-  std::string web_folder;                  // of the built page; empty: none is served
+  std::string web_folder;  // of the built page; empty: none is served
   std::string openapi_text;
   std::vector<std::string> allowed_names;  // of this computer, as a browser's address line has them
   std::string product = "tbm";             // what tools are told

@@ -89,7 +89,8 @@ Result<StaticFiles, std::string> StaticFiles::Read(const std::string& folder) {
     const auto& entry = *entries;
     // A link could lead anywhere.
     if (entry.is_symlink(error)) {
-      return Failure{fmt::format("{}: is a link; the page is made of files", entry.path().string())};
+      return Failure{
+          fmt::format("{}: is a link; the page is made of files", entry.path().string())};
     }
     if (!entry.is_regular_file(error)) continue;
     total += entry.file_size(error);

@@ -118,8 +118,8 @@ Result<SelfSigned, std::string> MakeSelfSigned(const std::string& state_folder,
   const Memory certificate_text(BIO_new(BIO_s_mem()));
   const Memory key_text(BIO_new(BIO_s_mem()));
   if (!certificate || PEM_write_bio_X509(certificate_text.get(), certificate.get()) != 1 ||
-      PEM_write_bio_PrivateKey(
-          key_text.get(), key.get(), nullptr, nullptr, 0, nullptr, nullptr) != 1) {
+      PEM_write_bio_PrivateKey(key_text.get(), key.get(), nullptr, nullptr, 0, nullptr, nullptr) !=
+          1) {
     ERR_clear_error();
     return Failure{std::string("OpenSSL cannot make a certificate")};
   }
@@ -138,8 +138,7 @@ std::optional<std::string> WhyNotTls(const TlsFiles& files) {
   if (!certificate_file) {
     return fmt::format("certificate {}: cannot be read", files.certificate_pem);
   }
-  const Certificate certificate(
-      PEM_read_X509(certificate_file.get(), nullptr, nullptr, nullptr));
+  const Certificate certificate(PEM_read_X509(certificate_file.get(), nullptr, nullptr, nullptr));
   const File key_file(std::fopen(files.key_pem.c_str(), "re"));
   // An empty pass phrase at hand: OpenSSL would ask the terminal for one.
   char no_phrase[] = "";

@@ -92,12 +92,11 @@ class Socket : public OpenSocket, public std::enable_shared_from_this<Socket> {
     is_writing_ = true;
     WakeAt(steady_clock::now() + shared_.options.limits.write);
     socket_.text(is_text);
-    socket_.async_write(buffers,
-                        [self = shared_from_this()](error_code error, std::size_t bytes) {
-                          self->is_writing_ = false;
-                          if (error) return self->Drop();
-                          if (!self->is_leaving_) self->OnWritten(bytes);
-                        });
+    socket_.async_write(buffers, [self = shared_from_this()](error_code error, std::size_t bytes) {
+      self->is_writing_ = false;
+      if (error) return self->Drop();
+      if (!self->is_leaving_) self->OnWritten(bytes);
+    });
   }
 
   void WakeAt(steady_clock::time_point when) {
@@ -142,7 +141,8 @@ class Socket : public OpenSocket, public std::enable_shared_from_this<Socket> {
     socket_.async_read(buffer_, [self = shared_from_this()](error_code error, std::size_t) {
       if (error == beast::error::timeout) self->shared_.counters.Refuse(Refusal::kTimeout);
       if (error && error != websocket::error::closed && error != asio::error::eof &&
-          error.category() != asio::error::get_system_category() && error != beast::error::timeout) {
+          error.category() != asio::error::get_system_category() &&
+          error != beast::error::timeout) {
         self->shared_.counters.Refuse(Refusal::kMalformed);
       }
       if (error) return self->Drop();

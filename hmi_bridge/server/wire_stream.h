@@ -71,7 +71,9 @@ class WireStream {
 // TLS would only be one more thing to wait for.
 inline void beast_close_socket(WireStream& stream) { stream.Close(); }
 
-inline void teardown(boost::beast::role_type, WireStream& stream, boost::system::error_code& error) {
+inline void teardown(boost::beast::role_type,
+                     WireStream& stream,
+                     boost::system::error_code& error) {
   stream.Close();
   error = {};
 }

@@ -1,0 +1,738 @@
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <zlib.h>
+
+#include "hmi_bridge/server/foxglove.h"
+#include "hmi_bridge/server/http_message.h"
+#include "hmi_bridge/server/json_text.h"
+#include "hmi_bridge/server/live_feed.h"
+#include "hmi_bridge/server/origin.h"
+#include "hmi_bridge/server/query.h"
+#include "hmi_bridge/server/rate_limit.h"
+#include "hmi_bridge/server/router.h"
+#include "hmi_bridge/server/server_core.h"
+#include "hmi_bridge/server/server_options.h"
+#include "hmi_bridge/server/static_files.h"
+#include "hmi_bridge/server/tls_files.h"
+#include "tests/hmi_bridge/server/fake_source.h"
+#include "tests/support/fake_clock.h"
+#include "tests/support/temp_folder.h"
+
+namespace tbm::hmi {
+namespace {
+
+using tbm::test::WriteText;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using namespace std::chrono_literals;
+using Json = nlohmann::json;
+
+constexpr const char* kPassword = "grease and granite";
+
+std::string Header(const Response& response, std::string_view name) {
+  for (const auto& [key, value] : response.headers) {
+    if (key == name) return value;
+  }
+  return {};
+}
+
+std::string Body(const Response& response) { return response.body ? *response.body : ""; }
+
+std::string ErrorOf(const Response& response) {
+  const Json body = Json::parse(Body(response), nullptr, false);
+  return body.is_object() ? body.value("error", "") : "";
+}
+
+// The page as a build leaves it.
+void WritePage(const std::string& folder) {
+  std::filesystem::create_directories(folder + "/assets");
+  WriteText(folder + "/index.html", "<!doctype html><title>console</title>");
+  WriteText(folder + "/assets/main-1a2b3c4d.js", std::string(5000, 'x') + "/* page */");
+  WriteText(folder + "/assets/tiny-1a2b3c4d.css", "a{}");
+  WriteText(folder + "/icon.png", "\x89PNG");
+}
+
+class Gate : public ::testing::Test {
+ protected:
+  Gate() {
+    AuthLimits cheap;
+    cheap.log2_n = kLeastLog2N;
+    auth_ = std::move(AuthStore::Open(folder_ / "state", clock_, cheap)).value();
+    for (const auto& [name, role] :
+         {std::pair{"vera", Role::kViewer}, {"otto", Role::kOperator}, {"sue", Role::kSurveyor}}) {
+      EXPECT_EQ(auth_->AddUser(name, role, kPassword), std::nullopt);
+    }
+    read_token_ = *auth_->AddToken("grafana");
+    WritePage(folder_ / "web");
+    files_ = std::move(StaticFiles::Read(folder_ / "web")).value();
+    options_.openapi_text = "openapi: 3.1.0\n";
+    options_.allowed_names = {"tbm-panel"};
+    options_.on_event = [this](const ServerEvent& event) { events_.push_back(event); };
+    router_ = std::make_unique<Router>(options_, files_, source_, *auth_, clock_, counters_);
+  }
+
+  static Request Get(std::string target, std::string cookie = "") {
+    Request request;
+    request.method = "GET";
+    request.target = std::move(target);
+    request.host = "127.0.0.1:8080";
+    request.cookie = std::move(cookie);
+    request.peer = {"127.0.0.1", "127.0.0.1", true, false};
+    return request;
+  }
+  static Request Post(std::string target, std::string body, std::string cookie = "") {
+    Request request = Get(std::move(target), std::move(cookie));
+    request.method = "POST";
+    request.body = std::move(body);
+    request.content_type = "application/json";
+    request.has_origin = true;
+    request.origin = "http://127.0.0.1:8080";
+    return request;
+  }
+  static Request LoginAs(const std::string& name, const std::string& password) {
+    return Post("/api/login", Json{{"name", name}, {"password", password}}.dump());
+  }
+  static Request Socket(std::string target, std::string cookie, const char* protocol) {
+    Request request = Get(std::move(target), std::move(cookie));
+    request.is_upgrade = true;
+    request.has_origin = true;
+    request.origin = "http://127.0.0.1:8080";
+    request.subprotocols = protocol;
+    return request;
+  }
+  // Does at once what a worker would do later.
+  Response Answer(const Request& request) {
+    Routed routed = router_->Route(request);
+    if (auto* later = std::get_if<Later>(&routed)) return later->make();
+    if (auto* response = std::get_if<Response>(&routed)) return *response;
+    Response opened;
+    opened.status = 101;
+    return opened;
+  }
+  // "tbm_session=..."
+  std::string CookieOf(const std::string& name) {
+    const std::string header = Header(Answer(LoginAs(name, kPassword)), "Set-Cookie");
+    return header.substr(0, header.find(';'));
+  }
+
+  tbm::test::TempFolder folder_;
+  tbm::test::FakeClock clock_;
+  std::unique_ptr<AuthStore> auth_;
+  std::string read_token_;
+  StaticFiles files_;
+  ServerOptions options_;
+  test::FakeSource source_;
+  Counters counters_;
+  std::vector<ServerEvent> events_;
+  std::unique_ptr<Router> router_;
+};
+
+TEST_F(Gate, LoginSetsACookieThatScriptsAndForeignPagesCannotUse) {
+  const Response response = Answer(LoginAs("otto", kPassword));
+  EXPECT_EQ(response.status, 200);
+  const Json me = Json::parse(Body(response));
+  EXPECT_EQ(me["name"], "otto");
+  EXPECT_EQ(me["role"], "operator");
+  EXPECT_EQ(me["expires_at_utc_ms"].get<std::int64_t>(),
+            clock_.Now().ns / 1'000'000 + 12 * 3600 * 1000);
+  const std::string cookie = Header(response, "Set-Cookie");
+  EXPECT_THAT(cookie, HasSubstr("; HttpOnly"));
+  EXPECT_THAT(cookie, HasSubstr("; SameSite=Strict"));
+  EXPECT_THAT(cookie, HasSubstr("; Path=/"));
+  EXPECT_THAT(cookie, Not(HasSubstr("Secure")));
+  EXPECT_THAT(Body(response), Not(HasSubstr(cookie.substr(12, 43))));
+
+  Request request = LoginAs("otto", kPassword);
+  request.peer.is_tls = true;
+  request.origin = "https://127.0.0.1:8080";
+  const std::string secure = Header(Answer(request), "Set-Cookie");
+  EXPECT_THAT(secure, testing::StartsWith("__Host-tbm_session="));
+  EXPECT_THAT(secure, HasSubstr("; Secure"));
+  ASSERT_FALSE(events_.empty());
+  for (const ServerEvent& event : events_) {
+    EXPECT_EQ(event.what, ServerEvent::What::kLoggedIn);
+    EXPECT_EQ(event.name, "otto");
+    EXPECT_EQ(event.text, "");
+  }
+}
+
+TEST_F(Gate, WithoutSessionNothingIsTold) {
+  for (const char* target : {"/api/me",
+                             "/api/snapshot",
+                             "/api/history?point=cutter_face",
+                             "/api/advance?point=cutter_face",
+                             "/metrics"}) {
+    for (const char* cookie : {"", "tbm_session=", "tbm_session=AAAA", "other=1"}) {
+      const Response response = Answer(Get(target, cookie));
+      EXPECT_EQ(response.status, 401) << target;
+      EXPECT_EQ(ErrorOf(response), "not_logged_in") << target;
+    }
+    EXPECT_EQ(Answer(Get(target, CookieOf("vera"))).status, 200) << target;
+    Request with_token = Get(target);
+    with_token.authorization = "Bearer " + read_token_;
+    EXPECT_EQ(Answer(with_token).status, 200) << target;
+    with_token.authorization = "Basic " + read_token_;
+    EXPECT_EQ(Answer(with_token).status, 401) << target;
+  }
+  EXPECT_EQ(Answer(Post("/api/commands", "{}")).status, 401);
+  EXPECT_EQ(Answer(Get("/healthz")).status, 200);
+  EXPECT_EQ(Body(Answer(Get("/healthz"))), "ok");
+  EXPECT_EQ(Body(Answer(Get("/api/openapi.yaml"))), options_.openapi_text);
+}
+
+TEST_F(Gate, ACookieIsWorthNothingAfterLogout) {
+  const std::string cookie = CookieOf("otto");
+  const std::string other = CookieOf("otto");
+  const Response out = Answer(Post("/api/logout", "", cookie));
+  EXPECT_EQ(out.status, 204);
+  EXPECT_THAT(Header(out, "Set-Cookie"), HasSubstr("tbm_session=; "));
+  EXPECT_THAT(Header(out, "Set-Cookie"), HasSubstr("Max-Age=0"));
+  EXPECT_EQ(Answer(Get("/api/me", cookie)).status, 401);
+  EXPECT_EQ(Answer(Get("/api/me", other)).status, 200);
+  EXPECT_EQ(Answer(Post("/api/logout", "")).status, 204);
+}
+
+TEST_F(Gate, LoggingInTakesNoSessionThatTheBrowserBrought) {
+  // Fixation: a session's name is always the server's choice, and the one before ends.
+  const std::string before = CookieOf("vera");
+  Request request = LoginAs("otto", kPassword);
+  request.cookie = before + "; tbm_session=chosen";
+  const std::string set = Header(Answer(request), "Set-Cookie");
+  EXPECT_THAT(set, Not(HasSubstr("chosen")));
+  EXPECT_EQ(Answer(Get("/api/me", before)).status, 401);
+  EXPECT_EQ(Answer(Get("/api/me", "tbm_session=chosen")).status, 401);
+}
+
+TEST_F(Gate, RolesAreTheSourcesDecisionAndComeFromTheSession) {
+  const std::string acknowledge =
+      R"({"addressee":"guidance","verb":"acknowledge","argument":"guidance/deviation_high","because":"seen"})";
+  const std::string move = R"({"addressee":"total_station","verb":"set_up"})";
+  EXPECT_EQ(Answer(Post("/api/commands", acknowledge, CookieOf("vera"))).status, 403);
+  EXPECT_EQ(counters_.Refused(Refusal::kRole), 1u);
+  EXPECT_EQ(Answer(Post("/api/commands", acknowledge, CookieOf("otto"))).status, 202);
+  EXPECT_EQ(Answer(Post("/api/commands", move, CookieOf("otto"))).status, 403);
+  const Response sent = Answer(Post("/api/commands", move, CookieOf("sue")));
+  EXPECT_EQ(sent.status, 202);
+  EXPECT_EQ(Json::parse(Body(sent))["request_id"], "r1");
+  EXPECT_THAT(source_.asked(),
+              ElementsAre("vera/guidance/acknowledge/guidance/deviation_high/seen",
+                          "otto/guidance/acknowledge/guidance/deviation_high/seen",
+                          "otto/total_station/set_up//",
+                          "sue/total_station/set_up//"));
+  Request by_token = Post("/api/commands", acknowledge);
+  by_token.authorization = "Bearer " + read_token_;
+  EXPECT_EQ(Answer(by_token).status, 403) << "a read token reads";
+}
+
+TEST_F(Gate, ForeignPagesCannotPost) {
+  const std::string cookie = CookieOf("sue");
+  const std::string body = R"({"addressee":"a","verb":"b"})";
+  for (const char* origin : {"http://evil.example",
+                             "https://127.0.0.1:8080",
+                             "http://127.0.0.1",
+                             "http://127.0.0.1:80801",
+                             "http://127.0.0.1:8080.evil.example",
+                             "null",
+                             ""}) {
+    Request request = Post("/api/commands", body, cookie);
+    request.origin = origin;
+    EXPECT_EQ(Answer(request).status, 403) << origin;
+    request = LoginAs("otto", kPassword);
+    request.origin = origin;
+    EXPECT_EQ(Answer(request).status, 403) << origin;
+    request = Post("/api/logout", "", cookie);
+    request.origin = origin;
+    EXPECT_EQ(Answer(request).status, 403) << origin;
+  }
+  Request request = Post("/api/commands", body, cookie);
+  request.has_origin = false;
+  request.origin.clear();
+  EXPECT_EQ(Answer(request).status, 403);
+  request.fetch_site = "cross-site";
+  EXPECT_EQ(Answer(request).status, 403);
+  request.fetch_site = "same-origin";
+  EXPECT_EQ(Answer(request).status, 202);
+  request = Post("/api/commands", body, cookie);
+  for (const char* type :
+       {"", "text/plain", "application/x-www-form-urlencoded", "application/jsonp"}) {
+    request.content_type = type;
+    EXPECT_EQ(Answer(request).status, 415) << type;
+  }
+  request.content_type = "application/json; charset=utf-8";
+  EXPECT_EQ(Answer(request).status, 202);
+}
+
+TEST_F(Gate, ForeignPagesCannotListen) {
+  const std::string cookie = CookieOf("vera");
+  constexpr const char* kLive = "tbm.console.v1";
+  EXPECT_EQ(Answer(Socket("/api/live", cookie, kLive)).status, 101);
+  EXPECT_EQ(Answer(Socket("/api/live", "", kLive)).status, 401);
+  EXPECT_EQ(Answer(Socket("/api/live", cookie, "chat")).status, 426);
+  EXPECT_EQ(Answer(Get("/api/live", cookie)).status, 403);
+  Request foreign = Socket("/api/live", cookie, kLive);
+  foreign.origin = "http://evil.example";
+  EXPECT_EQ(Answer(foreign).status, 403);
+  foreign.authorization = "Bearer " + read_token_;
+  EXPECT_EQ(Answer(foreign).status, 403);
+  Request program = Socket("/api/live", "", kLive);
+  program.has_origin = false;
+  program.origin.clear();
+  EXPECT_EQ(Answer(program).status, 403);
+  program.authorization = "Bearer " + read_token_;
+  EXPECT_EQ(Answer(program).status, 101);
+  program.authorization = "Bearer x" + read_token_;
+  EXPECT_EQ(Answer(program).status, 401);
+  program.authorization = "x";
+  program.cookie = cookie;
+  EXPECT_EQ(Answer(program).status, 401) << "a cookie without an origin, dressed as a token";
+  EXPECT_EQ(counters_.Refused(Refusal::kForeignOrigin), 4u);
+}
+
+TEST_F(Gate, ToolsListenWithACookieFromHereOrATokenFromAnywhere) {
+  const std::string cookie = CookieOf("vera");
+  constexpr const char* kTool = "foxglove.websocket.v1";
+  EXPECT_EQ(Answer(Socket("/foxglove", cookie, kTool)).status, 101);
+  Request elsewhere = Socket("/foxglove", cookie, kTool);
+  elsewhere.origin = "https://app.example";
+  EXPECT_EQ(Answer(elsewhere).status, 403);
+  elsewhere.has_origin = false;
+  EXPECT_EQ(Answer(elsewhere).status, 403);
+  elsewhere =
+      Socket("/foxglove?token=" + read_token_, "", "foxglove.sdk.v1, foxglove.websocket.v1");
+  elsewhere.origin = "https://app.example";
+  EXPECT_EQ(Answer(elsewhere).status, 101);
+  elsewhere = Socket("/foxglove?token=wrong", cookie, kTool);
+  EXPECT_EQ(Answer(elsewhere).status, 401);
+  EXPECT_EQ(Answer(Socket("/foxglove?tokn=" + read_token_, "", kTool)).status, 400);
+  EXPECT_EQ(Answer(Socket("/foxglove", cookie, "foxglove.websocket.v2")).status, 426);
+}
+
+TEST_F(Gate, AForeignNameOfOurAddressIsRefused) {
+  for (const char* host : {"evil.example",
+                           "evil.example:8080",
+                           "127.0.0.1.evil.example",
+                           "127.0.0.1@evil.example",
+                           "localhost:0",
+                           "localhost:99999",
+                           "localhost:8080:8080",
+                           "[::1",
+                           "[::1]x",
+                           "10.0.0.9",
+                           ""}) {
+    Request request = Get("/healthz");
+    request.host = host;
+    const Response response = Answer(request);
+    EXPECT_EQ(response.status, 421) << host;
+    EXPECT_TRUE(response.must_close);
+  }
+  for (const char* host :
+       {"127.0.0.1:8080", "localhost", "LOCALHOST:9000", "[::1]:8080", "Tbm-Panel"}) {
+    Request request = Get("/healthz");
+    request.host = host;
+    EXPECT_EQ(Answer(request).status, 200) << host;
+    request.has_one_host = false;
+    EXPECT_EQ(Answer(request).status, 421) << host;
+  }
+  Request request = Get("/healthz");
+  request.peer.local_address = "10.0.0.9";
+  request.host = "10.0.0.9:8443";
+  EXPECT_EQ(Answer(request).status, 200) << "the address it came to";
+}
+
+TEST_F(Gate, GuessingIsSlowForAnAddressAndForAName) {
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(Answer(LoginAs("otto", "wrong")).status, 401);
+  Response limited = Answer(LoginAs("otto", kPassword));
+  EXPECT_EQ(limited.status, 429);
+  EXPECT_EQ(Header(limited, "Retry-After"), "10");
+  EXPECT_EQ(Answer(LoginAs("sue", kPassword)).status, 429) << "the same address";
+  Request elsewhere = LoginAs("otto", kPassword);
+  elsewhere.peer.address = "10.1.1.1";
+  EXPECT_EQ(Answer(elsewhere).status, 429) << "the same name";
+  elsewhere = LoginAs("sue", kPassword);
+  elsewhere.peer.address = "10.1.1.1";
+  EXPECT_EQ(Answer(elsewhere).status, 200);
+  clock_.Advance(10s);
+  EXPECT_EQ(Answer(LoginAs("otto", kPassword)).status, 200) << "one in ten seconds";
+  EXPECT_EQ(Answer(LoginAs("otto", kPassword)).status, 200) << "who is right is not slowed";
+  EXPECT_EQ(events_.back().what, ServerEvent::What::kLoggedIn);
+  EXPECT_EQ(counters_.logins_wrong.load(), 5u);
+}
+
+TEST_F(Gate, CommandsAreLimitedForAUser) {
+  const std::string cookie = CookieOf("sue");
+  const std::string body = R"({"addressee":"a","verb":"b"})";
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(Answer(Post("/api/commands", body, cookie)).status, 202);
+  EXPECT_EQ(Answer(Post("/api/commands", body, cookie)).status, 429);
+  EXPECT_EQ(Answer(Post("/api/commands", body, CookieOf("otto"))).status, 403);
+  clock_.Advance(1s);
+  EXPECT_EQ(Answer(Post("/api/commands", body, cookie)).status, 202);
+}
+
+TEST_F(Gate, BodiesAreTakenExactly) {
+  const std::string cookie = CookieOf("sue");
+  struct Bad {
+    const char* body;
+    const char* says;
+  };
+  const Bad cases[] = {{"", "JSON object"},
+                       {"[]", "JSON object"},
+                       {"{", "JSON object"},
+                       {"\"x\"", "JSON object"},
+                       {R"({"verb":"b"})", "addressee is missing"},
+                       {R"({"addressee":"a","verb":7})", "verb must be a text"},
+                       {R"({"addressee":"a","verb":"b","role":"surveyor"})", "role is not known"},
+                       {R"({"addressee":{"a":1},"verb":"b"})", "object of texts"},
+                       {"{\"addressee\":\"\xff\",\"verb\":\"b\"}", "JSON object"}};
+  for (const Bad& bad : cases) {
+    const Response response = Answer(Post("/api/commands", bad.body, cookie));
+    EXPECT_EQ(response.status, 400) << bad.body;
+    EXPECT_EQ(ErrorOf(response), "bad_request") << bad.body;
+    EXPECT_THAT(Body(response), HasSubstr(bad.says)) << bad.body;
+  }
+  const std::string bomb = std::string(8000, '[') + std::string(8000, ']');
+  EXPECT_EQ(Answer(Post("/api/commands", bomb, cookie)).status, 400);
+  EXPECT_TRUE(source_.asked().empty());
+  // Brackets inside of texts are letters.
+  EXPECT_EQ(
+      Answer(Post("/api/commands", R"({"addressee":"a","verb":"b","because":"[[{{\"[["})", cookie))
+          .status,
+      202);
+}
+
+TEST_F(Gate, QuestionsAreTakenExactly) {
+  const std::string cookie = CookieOf("vera");
+  struct Bad {
+    const char* query;
+    const char* says;
+  };
+  const Bad cases[] = {{"", "point is missing"},
+                       {"point=", "point is missing"},
+                       {"point=a&point=b", "point is there twice"},
+                       {"point=a&mots=3", "mots is not known"},
+                       {"point=a&most=1", "most must be a number from 2 to 5000"},
+                       {"point=a&most=2.5", "most must be a whole number"},
+                       {"point=a&most=nan", "most must be"},
+                       {"point=a&from_utc_ms=inf", "from_utc_ms must be"},
+                       {"point=a&from_utc_ms=", "from_utc_ms must be"},
+                       {"point=a&from_utc_ms=0x10", "from_utc_ms must be"},
+                       {"point=a&from_utc_ms=2&to_utc_ms=1", "from_utc_ms is after"},
+                       {"point=%4", "percent-encoded"},
+                       {"point=%zz", "percent-encoded"},
+                       {"point=%00", "percent-encoded"},
+                       {"point=a%0d%0aSet-Cookie:x", "percent-encoded"},
+                       {"=a", "has no name"},
+                       {"&", "has no name"}};
+  for (const Bad& bad : cases) {
+    const Response response = Answer(Get(std::string("/api/history?") + bad.query, cookie));
+    EXPECT_EQ(response.status, 400) << bad.query;
+    EXPECT_THAT(Body(response), HasSubstr(bad.says)) << bad.query;
+  }
+  EXPECT_EQ(
+      Answer(Get("/api/history?po%69nt=cutter%5Fface&most=20&from_utc_ms=1.5e3", cookie)).status,
+      200);
+  EXPECT_EQ(source_.history().point, "cutter_face");
+  EXPECT_EQ(source_.history().most, 20);
+  EXPECT_EQ(source_.history().from_utc_ms, 1500.0);
+  EXPECT_EQ(source_.history().to_utc_ms, kEndOfTime_utc_ms);
+  const Response unknown = Answer(Get("/api/history?point=nose", cookie));
+  EXPECT_EQ(unknown.status, 400);
+  EXPECT_EQ(ErrorOf(unknown), "unknown_point");
+  EXPECT_EQ(Answer(Get("/api/advance?point=a+b&length_m=0.05", cookie)).status, 400);
+  EXPECT_EQ(Answer(Get("/api/advance?point=a+b&length_m=12.5", cookie)).status, 200);
+  EXPECT_EQ(source_.advance().point, "a b");
+  EXPECT_EQ(source_.advance().length_m, 12.5);
+}
+
+TEST_F(Gate, OnlyTheMethodsThatAPlaceHas) {
+  for (const char* method :
+       {"PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "PATCH", "get", "", "POST"}) {
+    Request request = Get("/api/snapshot", CookieOf("sue"));
+    request.method = method;
+    Response response = Answer(request);
+    EXPECT_EQ(response.status, 405) << method;
+    EXPECT_EQ(Header(response, "Allow"), "GET, HEAD");
+    request.target = "/index.html";
+    EXPECT_EQ(Answer(request).status, 405) << method;
+    request.target = "/nothing";
+    EXPECT_EQ(Answer(request).status, 404) << method;
+  }
+  const Response response = Answer(Get("/api/login"));
+  EXPECT_EQ(response.status, 405);
+  EXPECT_EQ(Header(response, "Allow"), "POST");
+  Request chunked = Get("/healthz");
+  chunked.has_transfer_encoding = true;
+  EXPECT_EQ(Answer(chunked).status, 400);
+}
+
+TEST_F(Gate, ThePageComesFromMemoryAndNothingElse) {
+  Response page = Answer(Get("/"));
+  EXPECT_EQ(page.status, 200);
+  EXPECT_EQ(Header(page, "Content-Type"), "text/html; charset=utf-8");
+  EXPECT_EQ(Header(page, "Cache-Control"), "no-cache");
+  EXPECT_EQ(Body(page), "<!doctype html><title>console</title>");
+  EXPECT_EQ(Body(Answer(Get("/index.html"))), Body(page));
+  EXPECT_EQ(Body(Answer(Get("/?x=1"))), Body(page));
+  for (const char* path : {"/../gate_test.cc",
+                           "/..%2fstate/users.json",
+                           "/%2e%2e/state/users.json",
+                           "/assets/../../state/users.json",
+                           "/assets/..\\..\\state\\users.json",
+                           "/%252e%252e%252fstate",
+                           "//state/users.json",
+                           "/./index.html",
+                           "/assets",
+                           "/assets/",
+                           "/index.html/",
+                           "/INDEX.HTML",
+                           "/index%2ehtml",
+                           "/api",
+                           "/api/",
+                           "/api/me/",
+                           "http://127.0.0.1/",
+                           "*",
+                           ""}) {
+    EXPECT_EQ(Answer(Get(path, CookieOf("sue"))).status, 404) << path;
+    clock_.Advance(10s);
+  }
+}
+
+TEST_F(Gate, WhatTheBrowserHasIsNotSentAgain) {
+  Request request = Get("/assets/main-1a2b3c4d.js");
+  const Response plain = Answer(request);
+  EXPECT_EQ(Header(plain, "Cache-Control"), "public, max-age=31536000, immutable");
+  EXPECT_EQ(Header(plain, "Vary"), "Accept-Encoding");
+  EXPECT_EQ(Body(plain).size(), 5010u);
+  request.accept_encoding = "br, gzip;q=0.8";
+  const Response zipped = Answer(request);
+  EXPECT_EQ(Header(zipped, "Content-Encoding"), "gzip");
+  EXPECT_LT(Body(zipped).size(), 200u);
+  z_stream stream = {};
+  std::string unzipped(6000, '\0');
+  ASSERT_EQ(inflateInit2(&stream, 15 + 16), Z_OK);
+  std::string packed = Body(zipped);
+  stream.next_in = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_in = static_cast<uInt>(packed.size());
+  stream.next_out = reinterpret_cast<Bytef*>(unzipped.data());
+  stream.avail_out = static_cast<uInt>(unzipped.size());
+  EXPECT_EQ(inflate(&stream, Z_FINISH), Z_STREAM_END);
+  unzipped.resize(stream.total_out);
+  inflateEnd(&stream);
+  EXPECT_EQ(unzipped, Body(plain));
+  EXPECT_NE(Header(plain, "ETag"), Header(zipped, "ETag"));
+  request.accept_encoding = "gzip;q=0";
+  EXPECT_EQ(Header(Answer(request), "Content-Encoding"), "");
+
+  request.if_none_match = "\"other\", " + Header(plain, "ETag");
+  const Response same = Answer(request);
+  EXPECT_EQ(same.status, 304);
+  EXPECT_EQ(Body(same), "");
+  EXPECT_EQ(Header(same, "ETag"), Header(plain, "ETag"));
+  request.if_none_match = "\"other\"";
+  EXPECT_EQ(Answer(request).status, 200);
+  Request tiny = Get("/assets/tiny-1a2b3c4d.css");
+  tiny.accept_encoding = "gzip";
+  EXPECT_EQ(Header(Answer(tiny), "Content-Encoding"), "");
+}
+
+TEST_F(Gate, AFolderThatIsNoPageIsRefused) {
+  EXPECT_THAT(StaticFiles::Read(folder_ / "state").error(), HasSubstr("no index.html"));
+  EXPECT_THAT(StaticFiles::Read(folder_ / "none").error(), HasSubstr("cannot be read"));
+  std::filesystem::create_symlink("/etc/passwd", folder_ / "web/link");
+  EXPECT_THAT(StaticFiles::Read(folder_ / "web").error(), HasSubstr("link: is a link"));
+}
+
+TEST_F(Gate, EveryAnswerSaysWhatABrowserMayDo) {
+  const std::string head = ResponseHead(Answer(Get("/nothing")), false, true);
+  EXPECT_THAT(head, testing::StartsWith("HTTP/1.1 404 Not Found\r\n"));
+  EXPECT_THAT(head,
+              HasSubstr("\r\nContent-Security-Policy: default-src 'none'; script-src 'self';"));
+  EXPECT_THAT(head, Not(HasSubstr("unsafe")));
+  EXPECT_THAT(head, HasSubstr("frame-ancestors 'none'"));
+  EXPECT_THAT(head, HasSubstr("\r\nX-Content-Type-Options: nosniff\r\n"));
+  EXPECT_THAT(head, HasSubstr("\r\nReferrer-Policy: no-referrer\r\n"));
+  EXPECT_THAT(head, HasSubstr("\r\nCross-Origin-Opener-Policy: same-origin\r\n"));
+  EXPECT_THAT(head, HasSubstr("\r\nCross-Origin-Resource-Policy: same-origin\r\n"));
+  EXPECT_THAT(head, HasSubstr("\r\nPermissions-Policy: "));
+  EXPECT_THAT(head, Not(HasSubstr("Strict-Transport-Security")));
+  EXPECT_THAT(ResponseHead({}, true, true), HasSubstr("\r\nStrict-Transport-Security: max-age="));
+  Response split;
+  split.Set("X-Name", "a\r\nSet-Cookie: tbm_session=mine");
+  split.Set("X-Good", "b");
+  const std::string safe = ResponseHead(split, false, false);
+  EXPECT_THAT(safe, Not(HasSubstr("Set-Cookie")));
+  EXPECT_THAT(safe, HasSubstr("X-Good: b"));
+  EXPECT_THAT(safe, HasSubstr("Connection: close\r\n\r\n"));
+}
+
+TEST_F(Gate, MetricsAreTheSourcesAndOurs) {
+  Answer(LoginAs("otto", "wrong"));
+  const std::string text = Body(Answer(Get("/metrics", CookieOf("vera"))));
+  EXPECT_THAT(text, HasSubstr("tbm_fake 1\n"));
+  EXPECT_THAT(text, HasSubstr("tbm_hmi_logins_total{outcome=\"wrong\"} 1\n"));
+  EXPECT_THAT(text, HasSubstr("tbm_hmi_refused_total{reason=\"foreign_origin\"} 0\n"));
+}
+
+TEST_F(Gate, TypedNamesCannotForgeLogLines) {
+  Answer(LoginAs("x\nlogged_in name=\"otto\"", "wrong"));
+  ASSERT_EQ(events_.size(), 1u);
+  EXPECT_EQ(events_[0].name, "x?logged_in?name=?otto?");
+}
+
+TEST(LiveFeed, SendsEachVersionOnceAndOnlyTheNewest) {
+  const auto text = [](const char* json) { return std::make_shared<const std::string>(json); };
+  LiveFeed feed;
+  Picture picture{{{"a", 1, text("1")}, {"b", 4, text("[2]")}, {"c", 0, nullptr}}, 1000.5, 7.25};
+  EXPECT_EQ(feed.Next(picture),
+            R"({"number":1,"at_utc_ms":1000.500,"at_steady_ms":7.250,"sections":{"a":1,"b":[2]}})");
+  EXPECT_EQ(feed.Next(picture),
+            R"({"number":2,"at_utc_ms":1000.500,"at_steady_ms":7.250,"sections":{}})");
+  picture.sections[1] = {"b", 9, text("3")};
+  picture.sections[2] = {"c", 1, text("null")};
+  EXPECT_EQ(Json::parse(feed.Next(picture))["sections"], Json::parse(R"({"b":3,"c":null})"));
+  picture.sections[1] = {"b", 8, text("2.5")};
+  EXPECT_EQ(Json::parse(feed.Next(picture))["sections"], Json::object())
+      << "older than what was sent";
+}
+
+TEST(RateLimit, SoManyAtOnceThenOneInAPeriod) {
+  RateLimit limit(3, 10s, 4);
+  const RateLimit::SteadyTime start{1h};
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(limit.Take("a", start));
+  EXPECT_EQ(limit.Take("a", start), 10s);
+  EXPECT_EQ(limit.Take("a", start + 4s), 6s);
+  EXPECT_FALSE(limit.Take("b", start));
+  EXPECT_FALSE(limit.Take("a", start + 10s));
+  EXPECT_TRUE(limit.Take("a", start + 10s));
+  limit.GiveBack("a");
+  EXPECT_FALSE(limit.Take("a", start + 10s));
+  for (int i = 0; i < 100; ++i) limit.Take("key" + std::to_string(i), start + 10s);
+  EXPECT_LE(limit.keys(), 4u);
+  EXPECT_TRUE(limit.Take("a", start + 10s)) << "a crowd does not let off the one who asks most";
+  EXPECT_EQ(RateKey("2001:db8:1:2:3:4:5:6"), RateKey("2001:db8:1:2::9"));
+  EXPECT_NE(RateKey("2001:db8:1:2::9"), RateKey("2001:db8:1:3::9"));
+  EXPECT_EQ(RateKey("::ffff:10.0.0.1"), "10.0.0.1");
+}
+
+TEST(Foxglove, SubscriptionsCountAndNonsenseIsAnswered) {
+  FoxgloveSubscriptions subscriptions(2);
+  auto outcome = subscriptions.TakeText(
+      R"({"op":"subscribe","subscriptions":[{"id":7,"channelId":1},{"id":8,"channelId":1}]})");
+  EXPECT_THAT(outcome.begun, ElementsAre(1u));
+  EXPECT_TRUE(outcome.answers.empty());
+  std::vector<std::uint32_t> ids;
+  subscriptions.Each(1, [&](std::uint32_t id) { ids.push_back(id); });
+  EXPECT_THAT(ids, ElementsAre(7u, 8u));
+  outcome = subscriptions.TakeText(R"({"op":"unsubscribe","subscriptionIds":[7]})");
+  EXPECT_TRUE(outcome.ended.empty());
+  outcome = subscriptions.TakeText(R"({"op":"unsubscribe","subscriptionIds":[8]})");
+  EXPECT_THAT(outcome.ended, ElementsAre(1u));
+  EXPECT_TRUE(subscriptions.Channels().empty());
+  for (const char* nonsense :
+       {"",
+        "{",
+        "7",
+        "[]",
+        "{}",
+        R"({"op":7})",
+        R"({"op":"advertise","channels":[]})",
+        R"({"op":"subscribe","subscriptions":[7]})",
+        R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":2}]})",
+        R"({"op":"subscribe","subscriptions":[{"id":-1,"channelId":1}]})",
+        R"({"op":"subscribe","subscriptions":[{"id":4294967296,"channelId":1}]})",
+        R"({"op":"unsubscribe","subscriptionIds":[1]})",
+        R"({"op":"setParameters"})"}) {
+    outcome = subscriptions.TakeText(nonsense);
+    ASSERT_EQ(outcome.answers.size(), 1u) << nonsense;
+    const Json status = Json::parse(outcome.answers[0]);
+    EXPECT_EQ(status["op"], "status");
+    EXPECT_EQ(status["level"], 1);
+    EXPECT_TRUE(outcome.begun.empty());
+  }
+  EXPECT_EQ(subscriptions.TakeBinary().answers.size(), 1u);
+  std::string flood = R"({"op":"subscribe","subscriptions":[)";
+  for (int i = 0; i < 400; ++i)
+    flood += (i ? ",{\"id\":" : "{\"id\":") + std::to_string(i) + ",\"channelId\":0}";
+  outcome = subscriptions.TakeText(flood + "]}");
+  EXPECT_LE(outcome.answers.size(), 8u);
+  ids.clear();
+  subscriptions.Each(0, [&](std::uint32_t id) { ids.push_back(id); });
+  EXPECT_EQ(ids.size(), 256u);
+}
+
+TEST(Foxglove, TheQueueDropsTheOldest) {
+  SampleQueue queue(3, 100);
+  const auto sample = [](std::size_t bytes) {
+    return std::make_shared<const Sample>(Sample{0, {}, std::vector<std::byte>(bytes)});
+  };
+  for (std::uint32_t id = 0; id < 4; ++id)
+    EXPECT_EQ(queue.Push({id, sample(10)}), id == 3 ? 1u : 0u);
+  EXPECT_EQ(queue.Pop().subscription, 1u);
+  EXPECT_EQ(queue.Push({9, sample(95)}), 2u);
+  EXPECT_EQ(queue.size(), 1u);
+  EXPECT_EQ(queue.Push({10, sample(200)}), 2u) << "one that is too large for all of it";
+  EXPECT_TRUE(queue.empty());
+  EXPECT_EQ(queue.size_bytes(), 0u);
+}
+
+TEST(ServerOptions, ProblemsAreSentences) {
+  ServerOptions options;
+  EXPECT_TRUE(Problems(options).empty());
+  options.listen = {{"0.0.0.0", 80}, {"localhost", 80}, {"::", 80}, {"127.3.2.1", 80}, {"::1", 80}};
+  options.allowed_names = {"tbm-panel", "http://x", "x:80", ""};
+  options.tls.reset();
+  options.web_folder = "/nowhere";
+  const auto problems = Problems(options);
+  EXPECT_THAT(problems,
+              ElementsAre(HasSubstr("0.0.0.0 is reached from the network: passwords"),
+                          HasSubstr("'localhost' is no IPv4 or IPv6 address"),
+                          HasSubstr(":: is reached from the network"),
+                          HasSubstr("'http://x'"),
+                          HasSubstr("'x:80'"),
+                          HasSubstr("''"),
+                          HasSubstr("/nowhere: cannot be read")));
+  options = {};
+  options.listen = {{"0.0.0.0", 443}};
+  options.tls = TlsFiles{"/nowhere.pem", "/nowhere.key"};
+  EXPECT_THAT(Problems(options), ElementsAre(HasSubstr("/nowhere.pem: cannot be read")));
+  options.listen.clear();
+  options.tls.reset();
+  EXPECT_THAT(Problems(options), ElementsAre(HasSubstr("no address to listen on")));
+}
+
+TEST(Connections, OneAddressGetsItsShareAndThisComputerAll) {
+  tbm::test::TempFolder folder;
+  tbm::test::FakeClock clock;
+  AuthLimits cheap;
+  cheap.log2_n = kLeastLog2N;
+  const auto auth = std::move(AuthStore::Open(folder / "state", clock, cheap)).value();
+  test::FakeSource source;
+  test::FakeRaw raw;
+  ServerOptions options;
+  options.limits.connections = 5;
+  options.limits.connections_per_address = 2;
+  ServerShared shared(options, source, raw, *auth, clock);
+  auto one = shared.Admit("10.0.0.1", false);
+  auto two = shared.Admit("10.0.0.1", false);
+  EXPECT_NE(two, nullptr);
+  EXPECT_EQ(shared.Admit("10.0.0.1", false), nullptr);
+  const auto three = shared.Admit("127.0.0.1", true);
+  const auto four = shared.Admit("127.0.0.1", true);
+  const auto five = shared.Admit("127.0.0.1", true);
+  EXPECT_NE(five, nullptr);
+  EXPECT_EQ(shared.Admit("127.0.0.1", true), nullptr) << "all are taken";
+  one.reset();
+  EXPECT_NE(shared.Admit("10.0.0.1", false), nullptr);
+  EXPECT_EQ(shared.counters.Refused(Refusal::kTooManyConnections), 2u);
+  EXPECT_EQ(shared.counters.connections.load(), 4);
+}
+
+}  // namespace
+}  // namespace tbm::hmi
