@@ -29,6 +29,9 @@ constexpr std::int64_t kAuditLimit_bytes = 50'000'000;
 // An addressee that gets it later does not begin.
 constexpr std::chrono::seconds kCommandLives{30};
 
+// Of the command topic: what tools are passed on.
+constexpr int kOwnReaders = 1;
+
 std::int64_t SteadyMs(std::chrono::steady_clock::time_point at) {
   return std::chrono::duration_cast<std::chrono::milliseconds>(at.time_since_epoch()).count();
 }
@@ -242,7 +245,7 @@ class BridgeProcess::Impl {
 
   ApiAnswer Send(const dds::Command& command, const std::string& request_id) {
     const bool is_own = command.addressee.view() == kOwnAddressee;
-    if (!is_own && commands_.matched_readers() == 0) {
+    if (!is_own && commands_.matched_readers() <= kOwnReaders) {
       return ApiFault{503,
                       "cannot_send",
                       fmt::format("nobody hears commands: does {} run?", command.addressee.view())};
