@@ -8,10 +8,6 @@
 namespace tbm {
 namespace {
 
-// A fast regrip, and the longest way that one goes.
-constexpr double kRegrip_m_per_s = 8e-3;
-constexpr double kLongestStroke_m = 2.0;
-
 FixedVector<AlarmRule, kGuidanceAlarmCount> Plain(
     const std::array<GuidanceAlarmRule, kGuidanceAlarmCount>& rules) {
   FixedVector<AlarmRule, kGuidanceAlarmCount> plain;
@@ -200,15 +196,14 @@ UncertainRigid3 GuidanceCore::RearAt(const RearShieldFix& fix, Timestamp when) c
                                 machine_.coast);
   const std::optional<double> closed_m = joint_.Between(fix.at, when);
   const Eigen::Matrix3d turned = now.b_from_a.rotation.toRotationMatrix();
-  Eigen::Vector3d sigma_m(std::min(kRegrip_m_per_s * age_s, kLongestStroke_m), 0.0, 0.0);
+  Eigen::Vector3d sigma_m(RegripSigma(age_s), 0.0, 0.0);
   double turn_rad2 = 0.0;
   if (closed_m) {
     now.b_from_a.translation += turned.col(0) * *closed_m;
     const double across_m = machine_.track.crab_sigma_per_m * *closed_m;
-    const double unwatched_s =
-        std::max(SecondsBetween(*joint_.last(), std::max(fix.at, when)), 0.0);
-    sigma_m = {
-        std::hypot(ClosingSigma(*closed_m), kRegrip_m_per_s * unwatched_s), across_m, across_m};
+    const double along_m =
+        std::hypot(ClosingSigma(*closed_m), UnwatchedSigma(joint_, fix.at, when));
+    sigma_m = {along_m, across_m, across_m};
     const double steering = machine_.track.steering_per_sqrt_m;
     turn_rad2 = steering * steering * *closed_m;
   }

@@ -41,6 +41,18 @@ double ClosingSigma(double closed_m) {
   return closed_m == 0.0 ? 0.0 : std::hypot(kDeadBandSigma_m, kSlip * closed_m);
 }
 
+double RegripSigma(double unwatched_s) {
+  constexpr double kFastRegrip_m_per_s = 8e-3;
+  constexpr double kLongestStroke_m = 2.0;
+  return std::clamp(kFastRegrip_m_per_s * unwatched_s, 0.0, kLongestStroke_m);
+}
+
+double UnwatchedSigma(const JointClosing& joint, Timestamp one, Timestamp other) {
+  const auto [from, to] = std::minmax(one, other);
+  const Timestamp since = joint.last() ? std::max(from, *joint.last()) : from;
+  return RegripSigma(SecondsBetween(since, to));
+}
+
 bool RearTracker::IsTrusted(Timestamp sensed_at) const {
   return set_up_ && set_up_->number != 0 &&
          !(set_up_->trusted_until && sensed_at > *set_up_->trusted_until);
@@ -108,14 +120,20 @@ void RearTracker::Fix(const TiltMean& camera_tilt, const JointClosing& joint) {
       continue;
     }
     const std::optional<double> moved_m = joint.Between(newest, kept.seen.sensed_at);
-    if (!moved_m) problem.speed_sigma_m_per_s = kSpeedPriorWithoutJoint_m_per_s;
+    double moved_sigma_m = 0.0;
+    if (moved_m) {
+      moved_sigma_m =
+          std::hypot(ClosingSigma(*moved_m), UnwatchedSigma(joint, kept.seen.sensed_at, newest));
+    } else {
+      problem.speed_sigma_m_per_s = kSpeedPriorWithoutJoint_m_per_s;
+    }
     problem.fixes.push_back({static_cast<int>(i),
                              kept.seen.sensed_at,
                              kept.seen.p_in_site,
                              kept.seen.covariance,
                              kept.seen.by_station,
                              moved_m.value_or(0.0),
-                             ClosingSigma(moved_m.value_or(0.0))});
+                             moved_sigma_m});
   }
   // Of a set-up that is taken up again some readings may be left from before the later one.
   if (problem.fixes.empty() || (!past_.empty() && newest < past_.back().newest_reading)) return;

@@ -18,6 +18,11 @@ namespace tbm {
 // the front shield may have slipped back.
 double ClosingSigma(double closed_m);
 
+// How far a regrip may have pulled the rear shield in a time in which nobody watched the joint.
+double RegripSigma(double unwatched_s);
+// The same for what lies behind the joint's last length between one moment and the other.
+double UnwatchedSigma(const JointClosing& joint, Timestamp one, Timestamp other);
+
 // The rear shield from what the total station sees, prism by prism: keeps the last reading of each
 // prism, makes a fix with every new one, and remembers past fixes, because a check of the
 // references may say later that the newest are not to be used. No heap.

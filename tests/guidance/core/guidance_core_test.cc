@@ -576,6 +576,45 @@ TEST_F(Core, WhatTheJointDidSinceTheLastPoseNobodyKnows) {
   EXPECT_LT(along_sigma_m(17.0), 17.0 * 0.04);
 }
 
+// The camera is silent and the station goes on: from the last fix on, and no longer, nobody knows.
+TEST_F(Core, AFixAfterTheLastPoseEndsWhatNobodyKnows) {
+  Begin();
+  core_.Advance(Later(Only<PrismSeen>(round_), seconds(21)), at_ + seconds(10));
+  const ShieldState& rear = core_.snapshot().rear;
+  const double since_s = *core_.snapshot().station.age_s;
+  ASSERT_LT(since_s, 2.0);
+  const Eigen::Vector3d ahead = rear.site_from_shield.b_from_a.rotation * Eigen::Vector3d::UnitX();
+  const Eigen::Matrix3d covariance = rear.site_from_shield.covariance.bottomRightCorner<3, 3>();
+  EXPECT_LT(std::sqrt(ahead.dot(covariance * ahead)), 8e-3 * since_s + 0.01);
+}
+
+// A round whose second half is measured after the camera's last pose, in the middle of a regrip:
+// the prisms fit together only for who knows that nobody has watched the joint.
+TEST_F(Core, ARoundThatNobodyWatchesTheJointOfFitsTogether) {
+  Begin();
+  const Eigen::Vector3d ahead =
+      core_.snapshot().rear.site_from_shield.b_from_a.rotation * Eigen::Vector3d::UnitX();
+  const auto live = Without<SetUpKnown>(Without<PrismSeen>(round_));
+  core_.Advance(Later(live, seconds(12)), at_ + seconds(12));
+  core_.Advance(Later(live, seconds(24)), at_ + seconds(24));
+  core_.Advance(Later(live, seconds(33)), at_ + seconds(33));
+  int i = 0;
+  for (const GuidanceInput& input : Only<PrismSeen>(round_)) {
+    // Two as it stands, then it is pulled by 40 mm, then the other two.
+    PrismSeen prism = std::get<PrismSeen>(input);
+    const Duration after = seconds(36 + 3 * i);
+    prism.sensed_at = at_ + after;
+    if (i >= 2) prism.p_in_site += 0.04 * ahead;
+    core_.Advance(std::vector<GuidanceInput>{prism}, at_ + after);
+    ++i;
+  }
+  ASSERT_EQ(i, 4);
+  EXPECT_EQ(core_.snapshot().fix_trouble, GuidanceReason::kNone);
+  ASSERT_TRUE(core_.snapshot().fix);
+  EXPECT_EQ(core_.snapshot().fix->prisms_used, 4);
+  EXPECT_FALSE(core_.snapshot().fix->left_out);
+}
+
 TEST_F(Core, WhatTheJointDoesFromTheExposureToALaterFixNobodyKnows) {
   Begin();
   const auto live = Without<SetUpKnown>(Without<PrismSeen>(round_));
