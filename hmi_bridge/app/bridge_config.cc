@@ -1,5 +1,6 @@
 #include "hmi_bridge/app/bridge_config.h"
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 
@@ -67,6 +68,49 @@ void ReadTls(const YamlNode& node, const std::string& file, BridgeConfig* config
   }
 }
 
+// A day as "2026-05-01": its first moment, UTC.
+std::optional<Timestamp> DayOf(const std::string& text) {
+  using namespace std::chrono;
+  if (text.size() != 10 || text[4] != '-' || text[7] != '-') return {};
+  const auto number = [&](std::size_t at, std::size_t size) {
+    return ParseInteger(std::string_view(text).substr(at, size));
+  };
+  const auto y = number(0, 4);
+  const auto m = number(5, 2);
+  const auto d = number(8, 2);
+  if (!y || !m || !d || *y < 2000 || *y > 2100 || *m < 1 || *d < 1) return {};
+  const year_month_day date(
+      year(static_cast<int>(*y)), month(static_cast<unsigned>(*m)), day(static_cast<unsigned>(*d)));
+  if (!date.ok()) return {};
+  return Timestamp{duration_cast<Duration>(sys_days(date).time_since_epoch()).count()};
+}
+
+void ReadCalibrations(const YamlNode& node, BridgeConfig* config) {
+  if (!node.exists()) return;
+  if (!node.IsList()) {
+    node.Fault("is no list, such as [{what: camera, done_on: 2026-05-01, valid_days: 365}]");
+    return;
+  }
+  for (const YamlNode& item : node.Items()) {
+    if (!IsSection(item)) continue;
+    YamlSection section(item);
+    Calibration calibration;
+    calibration.what =
+        section.Require("what", "what is calibrated, e.g. camera").Text().value_or("");
+    const YamlNode done_on = section.Require("done_on", "a day such as 2026-05-01");
+    int valid_days = 365;
+    section.Integer("valid_days", 1, 3660, &valid_days);
+    section.RefuseOthers();
+    const auto text = done_on.Text();
+    const auto day = text ? DayOf(*text) : std::nullopt;
+    if (text && !day) done_on.Fault(fmt::format("'{}' is no day such as 2026-05-01", *text));
+    if (!day) continue;
+    calibration.done_at = *day;
+    calibration.due_at = *day + std::chrono::hours(24 * valid_days);
+    config->calibrations.push_back(calibration);
+  }
+}
+
 BridgeConfig Read(const YamlNode& root, const std::string& file) {
   BridgeConfig config;
   if (!root.IsMap()) {
@@ -88,6 +132,9 @@ BridgeConfig Read(const YamlNode& root, const std::string& file) {
   ReadTls(section.Know("tls"), file, &config);
   section.Text("web", &config.web_folder);
   config.web_folder = BesideFile(file, config.web_folder);
+  section.Text("journal", &config.journal_folder);
+  config.journal_folder = BesideFile(file, config.journal_folder);
+  ReadCalibrations(section.Know("calibrations"), &config);
   ReadDdsSection(section.Know("dds"), &config.dds);
   section.RefuseOthers();
   return config;

@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "hmi_bridge/core/calibration.h"
 #include "hmi_bridge/server/server_options.h"
 #include "pose/base/result.h"
 #include "pose/rig/dds_network.h"
@@ -20,7 +21,9 @@ struct BridgeConfig {
   bool tls_self_signed = false;
   std::string tls_certificate_file;  // empty: no TLS, or one of its own
   std::string tls_key_file;
-  std::string web_folder;  // empty: beside the program
+  std::string web_folder;      // empty: beside the program
+  std::string journal_folder;  // of the guidance; empty: no reports out of it
+  std::vector<Calibration> calibrations;
   DdsNetwork dds;
 
   bool has_tls() const { return tls_self_signed || !tls_certificate_file.empty(); }

@@ -1,5 +1,6 @@
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <thread>
@@ -55,6 +56,7 @@ ServerOptions OptionsOf(const BridgeConfig& config) {
   ServerOptions options;
   options.listen = config.listen;
   options.allowed_names = config.names;
+  options.limits.body_bytes = 300 * 1024;  // the shots of an accuracy report
   options.openapi_text = std::string(OpenApiText());
   options.product = fmt::format("tbm hmi_bridge {}", TBM_VERSION);
   options.on_event = LogServer;
@@ -93,6 +95,23 @@ std::string UrlOf(const ListenAddress& listen, std::uint16_t port, bool has_tls)
                      port);
 }
 
+std::string Absolute(const std::string& path) {
+  return path.empty() ? path : std::filesystem::absolute(path).lexically_normal().string();
+}
+
+// `tbm` lies beside this program.
+ReportPlaces PlacesOf(const BridgeConfig& config, const GuidedMachine& machine) {
+  std::error_code ignored;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
+  AxisFileOptions axis_options;
+  const auto file = ParseMachineFile(machine.machine_file.content, machine.machine_file.path);
+  if (file) axis_options = file->axis_options;
+  return {(program.parent_path() / "tbm").string(),
+          Absolute(machine.axis_file.path),
+          axis_options,
+          Absolute(config.journal_folder)};
+}
+
 void TellFirstUser(const FirstUser& user) {
   fmt::print(
       stderr,
@@ -129,9 +148,11 @@ ExitCode Run(const BridgeConfig& config,
   dds::AlarmRelay alarms;
   dds::Participant participant(participant_config, alarms.Handler(), dds::LogDds);
   BridgeProcess process(
-      ConsoleMachineOf(machine.machine, machine.rig, machine.axis, machine.machine_sha256),
+      ConsoleMachineOf(
+          machine.machine, machine.rig, machine.axis, machine.machine_sha256, config.calibrations),
       {TBM_VERSION, web.page_build, config.dds.domain, clock.Now()},
       *state,
+      PlacesOf(config, machine),
       participant,
       clock);
   ConsoleServer server(options, process, process, *auth.value(), clock);

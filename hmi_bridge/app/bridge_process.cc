@@ -1,5 +1,6 @@
 #include "hmi_bridge/app/bridge_process.h"
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <mutex>
@@ -12,6 +13,7 @@
 
 #include "hmi_bridge/app/answer_file.h"
 #include "hmi_bridge/app/audit_log.h"
+#include "hmi_bridge/app/report_runner.h"
 #include "hmi_bridge/server/console_server.h"
 #include "idl/cpp/codec.h"
 #include "idl/cpp/publisher.h"
@@ -60,6 +62,7 @@ class BridgeProcess::Impl {
   Impl(ConsoleMachine machine,
        BridgeFacts facts,
        const PrivateFolder& state_folder,
+       ReportPlaces report_places,
        dds::Participant& participant,
        const Clock& clock)
       : machine_id_(std::string_view(machine.machine.machine_id)),
@@ -69,7 +72,10 @@ class BridgeProcess::Impl {
         answers_(state_folder),
         audit_(state_folder.PathOf("audit.log"), kAuditLimit_bytes),
         commands_(participant),
-        board_(std::move(machine), std::move(facts), Moment()) {
+        board_(std::move(machine), std::move(facts), Moment()),
+        reports_(std::move(report_places), state_folder.PathOf("reports"), clock, [this] {
+          if (ConsoleServer* server = server_.load()) server->Notify();
+        }) {
     board_.own_alarms().Restore(answers_.Load());
   }
 
@@ -113,7 +119,7 @@ class BridgeProcess::Impl {
         board_.SetNetwork(participant_.IsRunning(), now);
         board_.Tick(now);
       }
-      if (server_ != nullptr) server_->Notify();
+      if (ConsoleServer* server = server_.load()) server->Notify();
       if (on_alive) on_alive();
       std::this_thread::sleep_for(kTick);
     }
@@ -127,7 +133,9 @@ class BridgeProcess::Impl {
   Picture Now() {
     const std::lock_guard lock(mutex_);
     const hmi::Moment now = Moment();
-    return {board_.Sections(),
+    std::vector<Section> sections = board_.Sections();
+    sections.push_back(reports_.View());
+    return {std::move(sections),
             static_cast<double>(Milliseconds(now.utc)),
             static_cast<double>(now.steady_ms)};
   }
@@ -165,6 +173,24 @@ class BridgeProcess::Impl {
           503, "cannot_send", "the audit log cannot be written, and nothing is done without it"};
     }
     return Send(command, request_id);
+  }
+
+  ApiAnswer StartReport(std::string_view json, const std::string& user, Role role) {
+    CommandRequest asked{
+        std::string(kOwnAddressee), "report", std::string(json.substr(0, 200)), ""};
+    const Timestamp now = clock_.Now();
+    if (role < Role::kSurveyor) {
+      (void)audit_.Add(now, user, role, asked, "refused: not a surveyor");
+      return ApiFault{403, "forbidden", "reports are for surveyors"};
+    }
+    if (!audit_.Add(now, user, role, asked, "asked")) {
+      return ApiFault{503, "cannot_send", "the audit log cannot be written"};
+    }
+    return reports_.Start(json, user);
+  }
+
+  std::shared_ptr<const std::string> ReportFile(std::string_view id, std::string_view name) {
+    return reports_.File(id, name);
   }
 
   std::string Metrics() {
@@ -224,7 +250,7 @@ class BridgeProcess::Impl {
         const std::lock_guard lock(mutex_);
         board_.Add(message, arrival, Moment());
       }
-      server_->Notify();
+      server_.load()->Notify();
       PassOn(message);
     });
   }
@@ -232,10 +258,11 @@ class BridgeProcess::Impl {
   template <class Message>
   void PassOn(const Message& message) {
     static const std::size_t channel = ChannelOf<Message>();
-    if (!server_->HasListener(channel)) return;
+    ConsoleServer& server = *server_.load();
+    if (!server.HasListener(channel)) return;
     std::vector<std::byte> bytes;
     if (dds::EncodeCdr(message, &bytes) != dds::BoundaryFault::kNone) return;
-    server_->Publish(channel, clock_.Now(), bytes);
+    server.Publish(channel, clock_.Now(), bytes);
   }
 
   ApiAnswer AnswerOf(const std::string& point, const std::optional<Json>& view) const {
@@ -265,7 +292,7 @@ class BridgeProcess::Impl {
       board_.Sent(command, now);
       if (is_own && board_.Obey(command, now)) answers_.Keep(board_.own_alarms().answers());
     }
-    if (server_ != nullptr) server_->Notify();
+    if (ConsoleServer* server = server_.load()) server->Notify();
     return Json({{"request_id", request_id}}).dump();
   }
 
@@ -276,10 +303,11 @@ class BridgeProcess::Impl {
   AnswerFile answers_;
   AuditLog audit_;
   dds::Publisher<dds::Command> commands_;
-  ConsoleServer* server_ = nullptr;
+  std::atomic<ConsoleServer*> server_ = nullptr;
 
   std::mutex mutex_;  // guards board_
   ConsoleBoard board_;
+  ReportRunner reports_;  // has a lock of its own
 
   Input<dds::FrameFeatures> features_;
   Input<dds::TiltReading> tilts_;
@@ -298,10 +326,15 @@ class BridgeProcess::Impl {
 BridgeProcess::BridgeProcess(ConsoleMachine machine,
                              BridgeFacts facts,
                              const PrivateFolder& state_folder,
+                             ReportPlaces report_places,
                              dds::Participant& participant,
                              const Clock& clock)
-    : impl_(std::make_unique<Impl>(
-          std::move(machine), std::move(facts), state_folder, participant, clock)) {}
+    : impl_(std::make_unique<Impl>(std::move(machine),
+                                   std::move(facts),
+                                   state_folder,
+                                   std::move(report_places),
+                                   participant,
+                                   clock)) {}
 BridgeProcess::~BridgeProcess() = default;
 
 void BridgeProcess::Listen(ConsoleServer& server) { impl_->Listen(server); }
@@ -319,6 +352,13 @@ ApiAnswer BridgeProcess::Advance(const AdvanceQuestion& question) {
 }
 ApiAnswer BridgeProcess::Ask(const CommandRequest& request, const std::string& user, Role role) {
   return impl_->Ask(request, user, role);
+}
+ApiAnswer BridgeProcess::StartReport(std::string_view json, const std::string& user, Role role) {
+  return impl_->StartReport(json, user, role);
+}
+std::shared_ptr<const std::string> BridgeProcess::ReportFile(std::string_view id,
+                                                             std::string_view name) {
+  return impl_->ReportFile(id, name);
 }
 std::string BridgeProcess::Metrics() { return impl_->Metrics(); }
 const std::vector<RawChannel>& BridgeProcess::Channels() const { return impl_->Channels(); }

@@ -5,6 +5,7 @@
 #include <stop_token>
 
 #include "hmi_bridge/app/bridge_config.h"
+#include "hmi_bridge/app/report_request.h"
 #include "hmi_bridge/core/console_board.h"
 #include "hmi_bridge/server/console_source.h"
 #include "hmi_bridge/server/private_folder.h"
@@ -23,6 +24,7 @@ class BridgeProcess final : public ConsoleSource, public RawSource {
   BridgeProcess(ConsoleMachine machine,
                 BridgeFacts facts,
                 const PrivateFolder& state_folder,
+                ReportPlaces report_places,
                 dds::Participant& participant,
                 const Clock& clock);
   ~BridgeProcess() override;
@@ -40,6 +42,9 @@ class BridgeProcess final : public ConsoleSource, public RawSource {
   ApiAnswer History(const HistoryQuestion& question) override;
   ApiAnswer Advance(const AdvanceQuestion& question) override;
   ApiAnswer Ask(const CommandRequest& request, const std::string& user, Role role) override;
+  ApiAnswer StartReport(std::string_view json, const std::string& user, Role role) override;
+  std::shared_ptr<const std::string> ReportFile(std::string_view id,
+                                                std::string_view name) override;
   std::string Metrics() override;
   const std::vector<RawChannel>& Channels() const override;
 

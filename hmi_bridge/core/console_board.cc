@@ -177,13 +177,20 @@ std::optional<ConsoleAlarm> AlarmOf(dds::AlarmKind kind) {
 ConsoleMachine ConsoleMachineOf(const Machine& machine,
                                 const Rig& rig,
                                 const DesignAxis& axis,
-                                std::string machine_sha256) {
+                                std::string machine_sha256,
+                                std::vector<Calibration> calibrations) {
   Json leds = Json::array();
   for (const Led& led : rig.leds) leds.push_back(led.id);
   Json points = Json::array();
   for (const MachinePoint& point : machine.points) {
     points.push_back(
         {{"name", point.name}, {"shield", point.shield == ShieldName::kFront ? "front" : "rear"}});
+  }
+  Json due = Json::array();
+  for (const Calibration& calibration : calibrations) {
+    due.push_back({{"what", calibration.what},
+                   {"done_at_utc_ms", Milliseconds(calibration.done_at)},
+                   {"due_at_utc_ms", Milliseconds(calibration.due_at)}});
   }
   Json view = {
       {"machine_id", machine.machine_id},
@@ -201,8 +208,14 @@ ConsoleMachine ConsoleMachineOf(const Machine& machine,
       {"leds", std::move(leds)},
       {"points", std::move(points)},
       {"ring_length_mm", machine.rings ? Rounded(machine.rings->length_m * 1e3, 1) : Json(nullptr)},
+      {"calibrations", std::move(due)},
       {"axis", AxisView(axis)}};
-  return {machine, rig, std::move(machine_sha256), axis.file_sha256(), std::move(view)};
+  return {machine,
+          rig,
+          std::move(machine_sha256),
+          axis.file_sha256(),
+          std::move(calibrations),
+          std::move(view)};
 }
 
 ConsoleBoard::ConsoleBoard(ConsoleMachine machine, BridgeFacts facts, const Moment& now)
@@ -350,8 +363,18 @@ void ConsoleBoard::WatchSilence(const Moment& now) {
   own_alarms_.Set(ConsoleAlarm::kTotalStationSilent, is_silent(station_heard, kSilent_ms));
 }
 
+void ConsoleBoard::WatchCalibrations(const Moment& now) {
+  std::string due;
+  for (const Calibration& calibration : machine_.calibrations) {
+    if (now.utc < calibration.due_at) continue;
+    due += (due.empty() ? "" : ", ") + calibration.what;
+  }
+  own_alarms_.Set(ConsoleAlarm::kCalibrationDue, !due.empty(), due);
+}
+
 void ConsoleBoard::Tick(const Moment& now) {
   WatchSilence(now);
+  WatchCalibrations(now);
   bool changed = own_alarms_.Tick(now.utc);
   for (const auto& [key, told] : alarms_) {
     const bool was_silent = last_tick_.steady_ms - told.arrival.heard_steady_ms > kSilent_ms;

@@ -12,6 +12,7 @@
 
 #include "guidance/axis/design_axis.h"
 #include "guidance/core/machine.h"
+#include "hmi_bridge/core/calibration.h"
 #include "hmi_bridge/core/commands.h"
 #include "hmi_bridge/core/heard.h"
 #include "hmi_bridge/core/history.h"
@@ -31,12 +32,14 @@ struct ConsoleMachine {
   Rig rig;
   std::string machine_sha256;
   std::string axis_sha256;
+  std::vector<Calibration> calibrations;
   Json view;  // section `machine`
 };
 ConsoleMachine ConsoleMachineOf(const Machine& machine,
                                 const Rig& rig,
                                 const DesignAxis& axis,
-                                std::string machine_sha256);
+                                std::string machine_sha256,
+                                std::vector<Calibration> calibrations);
 
 // What never changes while the bridge runs.
 struct BridgeFacts {
@@ -122,6 +125,7 @@ class ConsoleBoard {
   Json StationView() const;
   Json AlarmsView() const;
   void WatchSilence(const Moment& now);
+  void WatchCalibrations(const Moment& now);
 
   ConsoleMachine machine_;
   BridgeFacts facts_;

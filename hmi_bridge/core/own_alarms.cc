@@ -85,6 +85,12 @@ constexpr std::array<ConsoleRule, kConsoleAlarmCount> kRules{{
      0s,
      "Something was sent that breaks the contract, and was refused.",
      "Tell the integrator."},
+    {ConsoleAlarm::kCalibrationDue,
+     "calibration_due",
+     AlarmPriority::kLow,
+     0s,
+     "A calibration is due:",
+     "Call the surveyor; the new day goes into hmi_bridge.yaml."},
 }};
 
 std::string KeyOf(std::string_view source, std::string_view code) {

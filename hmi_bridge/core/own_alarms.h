@@ -25,8 +25,9 @@ enum class ConsoleAlarm {
   kInterfaceMismatch,
   kIncompatibleQos,
   kSampleRejected,
+  kCalibrationDue,
 };
-inline constexpr int kConsoleAlarmCount = 10;
+inline constexpr int kConsoleAlarmCount = 11;
 
 // "guidance_silent".
 std::string_view CodeOf(ConsoleAlarm alarm);

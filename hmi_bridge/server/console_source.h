@@ -72,6 +72,17 @@ class ConsoleSource {
   // Sends it for `user`, whose role was checked by the source: it alone knows the verbs. JSON with
   // the request's id, or the refusal. Writes the audit log either way.
   virtual ApiAnswer Ask(const CommandRequest& request, const std::string& user, Role role) = 0;
+  // The surveyor's reports (openapi.yaml, /api/reports): JSON with the new one's id, or the
+  // refusal; a file of one, or null when there is none of this name.
+  virtual ApiAnswer StartReport(std::string_view json, const std::string& user, Role role) {
+    (void)json, (void)user, (void)role;
+    return ApiFault{404, "not_found", "this console makes no reports"};
+  }
+  virtual std::shared_ptr<const std::string> ReportFile(std::string_view id,
+                                                        std::string_view name) {
+    (void)id, (void)name;
+    return nullptr;
+  }
   // In Prometheus' text format, without the server's own.
   virtual std::string Metrics() = 0;
 };

@@ -16,6 +16,7 @@ namespace {
 constexpr std::string_view kJson = "application/json";
 constexpr std::string_view kLiveProtocol = "tbm.console.v1";
 constexpr std::string_view kFoxgloveProtocol = "foxglove.websocket.v1";
+constexpr std::string_view kReportFiles = "/api/reports/";
 // Somebody who fills the log fills the disk.
 constexpr int kEventsAtOnce = 20;
 constexpr std::chrono::milliseconds kEventPeriod(1000);
@@ -56,6 +57,7 @@ const Router::Place Router::kPlaces[] = {
     {"/api/history", "GET", &Router::History},
     {"/api/advance", "GET", &Router::Advance},
     {"/api/commands", "POST", &Router::Commands},
+    {"/api/reports", "POST", &Router::Reports},
     {"/api/openapi.yaml", "GET", &Router::OpenApi},
     {"/api/live", "GET", &Router::Live},
     {"/foxglove", "GET", &Router::Foxglove},
@@ -117,6 +119,7 @@ Routed Router::Route(const Request& request) {
     response.Set("Allow", place.method == "GET" ? "GET, HEAD" : std::string(place.method));
     return response;
   }
+  if (is_get && request.path().starts_with(kReportFiles)) return ReportFile(request);
   if (auto file = files_.Answer(request)) {
     if (is_get) return *std::move(file);
     Response response = ErrorResponse(405, "bad_request", "a file is asked with GET");
@@ -313,6 +316,56 @@ Routed Router::Commands(const Request& request) {
                  if (response.status == 403) counters_.Refuse(Refusal::kRole);
                  return response;
                }};
+}
+
+Routed Router::Reports(const Request& request) {
+  const auto identity = Who(request);
+  if (!identity) return NotLoggedIn();
+  if (auto refusal = WhyNotPost(request)) return *std::move(refusal);
+  if (!IsJson(request.content_type)) {
+    return ErrorResponse(415, "bad_request", "the body must be application/json");
+  }
+  std::optional<std::chrono::milliseconds> wait;
+  {
+    const std::lock_guard lock(mutex_);
+    wait = commands_.Take(identity->name, clock_.Steady());
+  }
+  if (wait) return TooMany("too many reports; wait", *wait);
+  return Later{Later::Where::kWriting, [this, body = request.body, identity = *identity] {
+                 Response response =
+                     Answer(202, source_.StartReport(body, identity.name, identity.role));
+                 if (response.status == 403) counters_.Refuse(Refusal::kRole);
+                 return response;
+               }};
+}
+
+// /api/reports/ID/NAME, compared as it came: nothing of it is decoded.
+Routed Router::ReportFile(const Request& request) {
+  if (!Who(request)) return NotLoggedIn();
+  const std::string_view rest = request.path().substr(kReportFiles.size());
+  const std::size_t slash = rest.find('/');
+  if (slash == std::string_view::npos) {
+    return ErrorResponse(404, "not_found", "a report's file is asked as ID/NAME");
+  }
+  return Later{
+      Later::Where::kWriting,
+      [this, id = std::string(rest.substr(0, slash)), name = std::string(rest.substr(slash + 1))] {
+        const auto bytes = source_.ReportFile(id, name);
+        if (bytes == nullptr) {
+          return ErrorResponse(404, "not_found", "there is no such file of a report");
+        }
+        Response response;
+        response.body = bytes;
+        const bool is_picture = name.ends_with(".png");
+        response.Set("Content-Type",
+                     is_picture                ? "image/png"
+                     : name.ends_with(".json") ? "application/json"
+                     : name.ends_with(".csv")  ? "text/csv; charset=utf-8"
+                                               : "text/plain; charset=utf-8");
+        response.Set("Content-Disposition", is_picture ? "inline" : "attachment");
+        response.Set("Cache-Control", "no-store");
+        return response;
+      }};
 }
 
 Routed Router::OpenApi(const Request&) {

@@ -64,6 +64,8 @@ class Router {
   Routed History(const Request& request);
   Routed Advance(const Request& request);
   Routed Commands(const Request& request);
+  Routed Reports(const Request& request);
+  Routed ReportFile(const Request& request);
   Routed OpenApi(const Request& request);
   Routed Metrics(const Request& request);
   Routed Health(const Request& request);

@@ -44,9 +44,10 @@ class BridgeProcessOnDds : public testing::Test {
     state_.emplace(PrivateFolder::Open(folder_ / "state").value());
     process_ = std::make_unique<BridgeProcess>(
         ConsoleMachineOf(
-            machine_->machine, machine_->rig, machine_->axis, machine_->machine_sha256),
+            machine_->machine, machine_->rig, machine_->axis, machine_->machine_sha256, {}),
         BridgeFacts{"1", "build", kDomain, clock_.Now()},
         *state_,
+        ReportPlaces{"/bin/true", folder_ / "axis.xml", {}, ""},
         participant_,
         clock_);
     server_ =
@@ -222,6 +223,15 @@ TEST_F(BridgeProcessOnDds, ItsOwnAlarmsAreAnsweredHereAndTheJournalHearsOfIt) {
   EXPECT_EQ(heard.addressee.view(), "hmi_bridge");
   EXPECT_EQ(heard.argument.view(), "camera_box/camera_silent");
   EXPECT_THAT(test::ReadText(state_->PathOf("answers.json")), HasSubstr("camera_silent"));
+}
+
+TEST_F(BridgeProcessOnDds, ReportsAreForSurveyorsAndTheirStateIsShown) {
+  const std::string axis_check = R"({"kind":"axis_check"})";
+  EXPECT_THAT(FaultOf(process_->StartReport(axis_check, "bob", Role::kOperator)), HasSubstr("403"));
+  ASSERT_EQ(FaultOf(process_->StartReport(axis_check, "ann", Role::kSurveyor)), "");
+  EXPECT_TRUE(Eventually([&] { return Part("reports")[0]["state"] == "done"; }));
+  EXPECT_EQ(process_->ReportFile("1", "nothing"), nullptr);
+  EXPECT_THAT(Audit(), HasSubstr("not a surveyor"));
 }
 
 TEST_F(BridgeProcessOnDds, ACommandThatNobodyHearsIsToldAtOnce) {

@@ -46,10 +46,13 @@ const GuidedMachine& Example() {
 // A board of the example's machine, and its clock.
 struct Console {
   Moment now{{1'800'000'000'000 * kMs}, 5'000'000};
-  ConsoleBoard board{
-      ConsoleMachineOf(Example().machine, Example().rig, Example().axis, Example().machine_sha256),
-      {"1.2.3", "build-7", 25, now.utc},
-      now};
+  ConsoleBoard board{ConsoleMachineOf(Example().machine,
+                                      Example().rig,
+                                      Example().axis,
+                                      Example().machine_sha256,
+                                      {{"camera", {0}, {1'800'000'100'000 * kMs}}}),
+                     {"1.2.3", "build-7", 25, now.utc},
+                     now};
 
   void Wait(std::int64_t ms) {
     now.utc = now.utc + std::chrono::milliseconds(ms);
@@ -427,6 +430,16 @@ TEST(ConsoleAlarms, AnotherMachineFileOrClockIsTold) {
   EXPECT_THAT(console.Alarms(),
               ElementsAre("hmi_bridge/other_machine_file unacknowledged",
                           "hmi_bridge/clock_disagrees unacknowledged"));
+}
+
+TEST(ConsoleAlarms, ACalibrationThatIsDueIsTold) {
+  Console console;
+  console.Hear(GuidanceAt(console.now.utc));
+  console.Wait(99'000);
+  EXPECT_TRUE(console.AlarmOf("calibration_due").is_null());
+  console.Wait(1000);
+  EXPECT_THAT(console.AlarmOf("calibration_due")["cause"].get<std::string>(), HasSubstr("camera"));
+  EXPECT_EQ(console.Part("machine")["calibrations"][0]["due_at_utc_ms"], 1'800'000'100'000);
 }
 
 TEST(ConsoleAlarms, NoNetworkIsOne) {
