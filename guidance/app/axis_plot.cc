@@ -49,6 +49,14 @@ std::string DataBlock(const DesignAxis& axis) {
   return script + "EOD\n";
 }
 
+bool HasCant(const DesignAxis& axis) {
+  const auto chainages = PlottedChainages(axis);
+  return std::any_of(chainages.begin(), chainages.end(), [&](InternalChainage chainage) {
+    const auto point = axis.At(chainage);
+    return point && point->cant;
+  });
+}
+
 // Joints in plan and profile: few enough to be told apart.
 std::string JointBlock(const DesignAxis& axis) {
   std::string script = "$joints << EOD\n";
@@ -115,10 +123,15 @@ std::string PlotScript(const DesignAxis& axis) {
   }
   script +=
       "set origin 0,0.01\nset size 1,0.26\nset xlabel 'chainage m'\nset ylabel 'curvature 1/km'\n"
-      "set zeroaxis lt -1 lc rgb '#888888'\nset y2label 'cant mm'\nset y2tics\nset ytics nomirror\n"
-      "plot $data using 1:4 with lines lw 2 lc rgb '#c0392b' title 'to the right +', "
-      "$data using 1:6 axes x1y2 with lines dt 2 lc rgb '#e08000' title 'cant, left rail up'\n"
-      "unset multiplot\n";
+      "set zeroaxis lt -1 lc rgb '#888888'\n";
+  const std::string curvature =
+      "plot $data using 1:4 with lines lw 2 lc rgb '#c0392b' title 'to the right +'";
+  // gnuplot draws nothing at all when one of the lines has no point.
+  script += HasCant(axis) ? "set y2label 'cant mm'\nset y2tics\nset ytics nomirror\n" + curvature +
+                                ", $data using 1:6 axes x1y2 with lines dt 2 lc rgb '#e08000' "
+                                "title 'cant, left rail up'\n"
+                          : curvature + "\n";
+  script += "unset multiplot\n";
   return script;
 }
 

@@ -245,5 +245,24 @@ TEST(AxisCommand, PlotDrawsAPicture) {
   EXPECT_EQ(Ran(RunAxisPlot, request).code, ExitCode::kBadInput) << "never over an existing file";
 }
 
+// Seen on 2026-11-23: the example machine's axis has no cant, and there was no picture of it.
+TEST(AxisCommand, PlotDrawsADesignWithoutCant) {
+  const TempFolder folder;
+  auto request = For<AxisPlotRequest>({TBM_SOURCE_DIR "/guidance/app/example/axis.xml", {}});
+  request.out = folder / "axis.png";
+  const Outcome outcome = Ran(RunAxisPlot, request);
+  ASSERT_EQ(outcome.code, ExitCode::kDone) << outcome.err;
+  EXPECT_GT(ReadText(request.out).size(), 20'000u);
+}
+
+TEST(AxisCommand, PlotDrawsPointsWithoutHeights) {
+  const TempFolder folder;
+  WriteText(folder / "axis.csv", "east_m,north_m\n0,0\n0,10\n0,20\n1,30\n");
+  auto request = For<AxisPlotRequest>({folder / "axis.csv", {}});
+  request.out = folder / "axis.png";
+  const Outcome outcome = Ran(RunAxisPlot, request);
+  EXPECT_EQ(outcome.code, ExitCode::kDone) << outcome.err;
+}
+
 }  // namespace
 }  // namespace tbm
