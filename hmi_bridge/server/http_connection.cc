@@ -93,20 +93,38 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
 
   void ReadRequest() {
     CloseAfter(limits().request);
+    http::async_read_header(
+        stream_, buffer_, *parser_, [self = shared_from_this()](error_code error, std::size_t) {
+          if (error) return self->OnUnreadable(error);
+          self->OnHead();
+        });
+  }
+
+  // Before anything of a body is read: how long it says it is, and whether that is welcome.
+  void OnHead() {
+    const Request head = RequestFrom(parser_->get(), peer_);
+    if (head.has_transfer_encoding) return OnRequest();  // refused there, unread
+    if (parser_->content_length().value_or(0) > shared_.router.BodyLimit(head)) {
+      return OnUnreadable(http::error::body_limit);
+    }
     http::async_read(
         stream_, buffer_, *parser_, [self = shared_from_this()](error_code error, std::size_t) {
-          if (!error) return self->OnRequest();
-          if (error == http::error::end_of_stream ||
-              error.category() == asio::error::get_system_category() ||
-              error.category() == asio::error::get_ssl_category() ||
-              error == asio::ssl::error::stream_truncated) {
-            return self->Close();
-          }
-          self->shared_.counters.Refuse(Refusal::kMalformed);
-          Response response = ErrorResponse(StatusOf(error), "bad_request", error.message());
-          response.must_close = true;
-          self->Send(std::move(response));
+          if (error) return self->OnUnreadable(error);
+          self->OnRequest();
         });
+  }
+
+  void OnUnreadable(const error_code& error) {
+    if (error == http::error::end_of_stream ||
+        error.category() == asio::error::get_system_category() ||
+        error.category() == asio::error::get_ssl_category() ||
+        error == asio::ssl::error::stream_truncated) {
+      return Close();
+    }
+    shared_.counters.Refuse(Refusal::kMalformed);
+    Response response = ErrorResponse(StatusOf(error), "bad_request", error.message());
+    response.must_close = true;
+    Send(std::move(response));
   }
 
   void OnRequest() {

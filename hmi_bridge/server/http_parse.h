@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <string>
 #include <string_view>
@@ -19,7 +20,8 @@ using BeastParser = boost::beast::http::request_parser<boost::beast::http::strin
 
 inline void Limit(BeastParser& parser, const ServerLimits& limits) {
   parser.header_limit(static_cast<std::uint32_t>(limits.header_bytes));
-  parser.body_limit(limits.body_bytes);
+  // The largest there is; what this very request may bring is decided by its head.
+  parser.body_limit(std::max(limits.body_bytes, limits.report_bytes));
 }
 
 // What the router decides by, out of what Boost.Beast has read.

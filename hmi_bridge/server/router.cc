@@ -15,8 +15,10 @@ namespace {
 
 constexpr std::string_view kJson = "application/json";
 constexpr std::string_view kLiveProtocol = "tbm.console.v1";
+constexpr std::string_view kReportsPlace = "/api/reports";
+constexpr std::string_view kReports = "/api/reports/";  // ID/NAME
+constexpr std::size_t kMostNested = 8;
 constexpr std::string_view kFoxgloveProtocol = "foxglove.websocket.v1";
-constexpr std::string_view kReportFiles = "/api/reports/";
 // Somebody who fills the log fills the disk.
 constexpr int kEventsAtOnce = 20;
 constexpr std::chrono::milliseconds kEventPeriod(1000);
@@ -40,6 +42,16 @@ std::string ForLog(std::string_view typed) {
   return shown;
 }
 
+Response NothingHere() { return ErrorResponse(404, "not_found", "there is nothing of this name"); }
+
+// One name, as it is: nothing that leads to another folder, nothing that is decoded.
+bool IsFileName(std::string_view name) {
+  constexpr std::string_view kFine =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
+  return !name.empty() && name.size() <= 100 && name.front() != '.' &&
+         name.find_first_not_of(kFine) == std::string_view::npos;
+}
+
 Response UpgradeRequired(std::string_view protocol) {
   Response response = ErrorResponse(
       426, "bad_request", fmt::format("this is a WebSocket with subprotocol {}", protocol));
@@ -57,7 +69,7 @@ const Router::Place Router::kPlaces[] = {
     {"/api/history", "GET", &Router::History},
     {"/api/advance", "GET", &Router::Advance},
     {"/api/commands", "POST", &Router::Commands},
-    {"/api/reports", "POST", &Router::Reports},
+    {kReportsPlace, "POST", &Router::Reports},
     {"/api/openapi.yaml", "GET", &Router::OpenApi},
     {"/api/live", "GET", &Router::Live},
     {"/foxglove", "GET", &Router::Foxglove},
@@ -119,14 +131,14 @@ Routed Router::Route(const Request& request) {
     response.Set("Allow", place.method == "GET" ? "GET, HEAD" : std::string(place.method));
     return response;
   }
-  if (is_get && request.path().starts_with(kReportFiles)) return ReportFile(request);
+  if (is_get && request.path().starts_with(kReports)) return ReportFile(request);
   if (auto file = files_.Answer(request)) {
     if (is_get) return *std::move(file);
     Response response = ErrorResponse(405, "bad_request", "a file is asked with GET");
     response.Set("Allow", "GET, HEAD");
     return response;
   }
-  return ErrorResponse(404, "not_found", "there is nothing of this name");
+  return NothingHere();
 }
 
 Response Router::Busy() {
@@ -295,21 +307,29 @@ Routed Router::Advance(const Request& request) {
   return Answer(200, source_.Advance(*question));
 }
 
-Routed Router::Commands(const Request& request) {
-  const auto identity = Who(request);
-  if (!identity) return NotLoggedIn();
-  if (auto refusal = WhyNotPost(request)) return *std::move(refusal);
+std::optional<Response> Router::WhyNotAsk(const Request& request, const Identity& identity) {
+  if (auto refusal = WhyNotPost(request)) return refusal;
   if (!IsJson(request.content_type)) {
     return ErrorResponse(415, "bad_request", "the body must be application/json");
   }
-  const auto command = ParseCommand(request.body);
-  if (!command) return Refused(command.error());
+  if (NestsDeeperThan(request.body, kMostNested)) {
+    return ErrorResponse(400, "bad_request", "the body is nested too deeply");
+  }
   std::optional<std::chrono::milliseconds> wait;
   {
     const std::lock_guard lock(mutex_);
-    wait = commands_.Take(identity->name, clock_.Steady());
+    wait = commands_.Take(identity.name, clock_.Steady());
   }
   if (wait) return TooMany("too many commands; wait", *wait);
+  return std::nullopt;
+}
+
+Routed Router::Commands(const Request& request) {
+  const auto identity = Who(request);
+  if (!identity) return NotLoggedIn();
+  if (auto refusal = WhyNotAsk(request, *identity)) return *std::move(refusal);
+  const auto command = ParseCommand(request.body);
+  if (!command) return Refused(command.error());
   return Later{Later::Where::kWriting, [this, command = *command, identity = *identity] {
                  Response response =
                      Answer(202, source_.Ask(command, identity.name, identity.role));
@@ -321,16 +341,7 @@ Routed Router::Commands(const Request& request) {
 Routed Router::Reports(const Request& request) {
   const auto identity = Who(request);
   if (!identity) return NotLoggedIn();
-  if (auto refusal = WhyNotPost(request)) return *std::move(refusal);
-  if (!IsJson(request.content_type)) {
-    return ErrorResponse(415, "bad_request", "the body must be application/json");
-  }
-  std::optional<std::chrono::milliseconds> wait;
-  {
-    const std::lock_guard lock(mutex_);
-    wait = commands_.Take(identity->name, clock_.Steady());
-  }
-  if (wait) return TooMany("too many reports; wait", *wait);
+  if (auto refusal = WhyNotAsk(request, *identity)) return *std::move(refusal);
   return Later{Later::Where::kWriting, [this, body = request.body, identity = *identity] {
                  Response response =
                      Answer(202, source_.StartReport(body, identity.name, identity.role));
@@ -339,33 +350,30 @@ Routed Router::Reports(const Request& request) {
                }};
 }
 
-// /api/reports/ID/NAME, compared as it came: nothing of it is decoded.
 Routed Router::ReportFile(const Request& request) {
   if (!Who(request)) return NotLoggedIn();
-  const std::string_view rest = request.path().substr(kReportFiles.size());
+  const std::string_view rest = request.path().substr(kReports.size());
   const std::size_t slash = rest.find('/');
-  if (slash == std::string_view::npos) {
-    return ErrorResponse(404, "not_found", "a report's file is asked as ID/NAME");
-  }
-  return Later{
-      Later::Where::kWriting,
-      [this, id = std::string(rest.substr(0, slash)), name = std::string(rest.substr(slash + 1))] {
-        const auto bytes = source_.ReportFile(id, name);
-        if (bytes == nullptr) {
-          return ErrorResponse(404, "not_found", "there is no such file of a report");
-        }
-        Response response;
-        response.body = bytes;
-        const bool is_picture = name.ends_with(".png");
-        response.Set("Content-Type",
-                     is_picture                ? "image/png"
-                     : name.ends_with(".json") ? "application/json"
-                     : name.ends_with(".csv")  ? "text/csv; charset=utf-8"
-                                               : "text/plain; charset=utf-8");
-        response.Set("Content-Disposition", is_picture ? "inline" : "attachment");
-        response.Set("Cache-Control", "no-store");
-        return response;
-      }};
+  const std::string_view id = rest.substr(0, slash);
+  const std::string_view name = slash == std::string_view::npos ? "" : rest.substr(slash + 1);
+  if (!IsFileName(id) || !IsFileName(name)) return NothingHere();
+  return Later{Later::Where::kWriting, [this, id = std::string(id), name = std::string(name)] {
+                 auto file = source_.ReportFile(id, name);
+                 if (file == nullptr) return NothingHere();
+                 Response response;
+                 response.Set("Content-Type", std::string(ContentTypeOf(name)));
+                 response.Set("Content-Disposition",
+                              name.ends_with(".png") ? "inline" : "attachment");
+                 response.Set("Cache-Control", "no-store");
+                 response.body = std::move(file);
+                 return response;
+               }};
+}
+
+std::size_t Router::BodyLimit(const Request& head) {
+  const ServerLimits& limits = options_.limits;
+  const bool is_report = head.method == "POST" && head.path() == kReportsPlace && Who(head);
+  return is_report ? std::max(limits.report_bytes, limits.body_bytes) : limits.body_bytes;
 }
 
 Routed Router::OpenApi(const Request&) {

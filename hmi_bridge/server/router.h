@@ -45,6 +45,8 @@ class Router {
          Counters& counters);
 
   Routed Route(const Request& request);
+  // How many bytes of a body are read at all, asked when only its head has come.
+  std::size_t BodyLimit(const Request& head);
   // For what there is no place to wait any more.
   Response Busy();
 
@@ -76,6 +78,8 @@ class Router {
   Response NotLoggedIn();
   Response ForeignOrigin(const Request& request, std::string_view text);
   std::optional<Response> WhyNotPost(const Request& request);
+  // The same for what is asked in somebody's name: JSON, and not too often.
+  std::optional<Response> WhyNotAsk(const Request& request, const Identity& identity);
   Response TooMany(std::string_view text, std::chrono::milliseconds wait);
   Response FinishLogin(const std::string& name,
                        const std::string& password,

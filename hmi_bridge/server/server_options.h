@@ -27,6 +27,7 @@ struct ServerLimits {
   std::size_t connections_per_address = 64;  // loopback: all
   std::size_t header_bytes = 8 * 1024;
   std::size_t body_bytes = 16 * 1024;
+  std::size_t report_bytes = 300 * 1024;     // of who is logged in and asks for a report
   std::size_t live_client_bytes = 4 * 1024;  // in one message of a console
   std::size_t foxglove_client_bytes = 16 * 1024;
   std::size_t waiting_samples = 256;  // for one tool

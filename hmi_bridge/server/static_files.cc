@@ -27,7 +27,7 @@ struct ContentType {
   std::string_view type;
   bool zips = false;
 };
-constexpr std::array<ContentType, 17> kTypes = {{
+constexpr std::array<ContentType, 18> kTypes = {{
     {".html", "text/html; charset=utf-8", true},
     {".js", "text/javascript; charset=utf-8", true},
     {".mjs", "text/javascript; charset=utf-8", true},
@@ -36,6 +36,7 @@ constexpr std::array<ContentType, 17> kTypes = {{
     {".map", "application/json", true},
     {".webmanifest", "application/manifest+json", true},
     {".svg", "image/svg+xml", true},
+    {".csv", "text/csv; charset=utf-8", true},
     {".txt", "text/plain; charset=utf-8", true},
     {".png", "image/png", false},
     {".jpg", "image/jpeg", false},
@@ -61,6 +62,8 @@ bool Matches(std::string_view if_none_match, std::string_view etag) {
 }
 
 }  // namespace
+
+std::string_view ContentTypeOf(std::string_view name) { return TypeOf(name).type; }
 
 std::string Gzipped(std::string_view bytes) {
   z_stream stream = {};

@@ -35,6 +35,8 @@ class StaticFiles {
   std::map<std::string, File, std::less<>> files_;
 };
 
+// By the ending of a file's name.
+std::string_view ContentTypeOf(std::string_view name);
 std::string Gzipped(std::string_view bytes);
 
 }  // namespace tbm::hmi

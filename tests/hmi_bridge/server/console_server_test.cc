@@ -154,6 +154,20 @@ TEST_F(Server, WhatIsNoHttpIsRefusedAndHarmsNobody) {
   EXPECT_EQ(honest.Ask(Get("/healthz")).status, 200);
 }
 
+TEST_F(Server, LargeBodiesAreTakenFromWhoIsLoggedInOnly) {
+  Start();
+  const std::string shots =
+      R"({"kind":"accuracy","shots_text":")" + std::string(200'000, 'x') + "\"}";
+  WireClient stranger(port_);
+  // Refused by what it says, before any of it has come.
+  stranger.Send("POST /api/reports HTTP/1.1\r\n" + Lines() + "Content-Length: 200000\r\n\r\n");
+  EXPECT_EQ(stranger.Answer().status, 413);
+  WireClient surveyor(port_);
+  const HttpAnswer answer = surveyor.Ask(Post("/api/reports", shots, CookieOf("sue")));
+  EXPECT_EQ(answer.status, 202) << answer.body;
+  EXPECT_EQ(surveyor.Ask(Post("/api/commands", shots, CookieOf("sue"))).status, 413);
+}
+
 TEST_F(Server, TheSlowAreLetGo) {
   options_.limits.request = 200ms;
   options_.limits.idle = 300ms;

@@ -38,6 +38,17 @@ class FakeSource final : public ConsoleSource {
     if (role < needed) return ApiFault{403, "forbidden", "your role may not"};
     return std::string(R"({"request_id":"r1"})");
   }
+  ApiAnswer StartReport(std::string_view json, const std::string& user, Role role) override {
+    const std::lock_guard lock(mutex_);
+    if (role < Role::kSurveyor) return ApiFault{403, "forbidden", "reports are for surveyors"};
+    asked_.push_back(user + " wants a report of " + std::to_string(json.size()) + " bytes");
+    return std::string(R"({"report_id":"7"})");
+  }
+  std::shared_ptr<const std::string> ReportFile(std::string_view id,
+                                                std::string_view name) override {
+    if (id != "7" || name != "axis_check.csv") return nullptr;
+    return std::make_shared<const std::string>("chainage_m\n");
+  }
   std::string Metrics() override { return "tbm_fake 1\n"; }
 
   // Sets a section and makes it news.

@@ -372,6 +372,46 @@ TEST_F(Gate, CommandsAreLimitedForAUser) {
   EXPECT_EQ(Answer(Post("/api/commands", body, cookie)).status, 202);
 }
 
+TEST_F(Gate, ReportsAreForSurveyorsAndTheirFilesForAll) {
+  const std::string body = R"({"kind":"axis_check"})";
+  EXPECT_EQ(Answer(Post("/api/reports", body)).status, 401);
+  EXPECT_EQ(Answer(Post("/api/reports", body, CookieOf("otto"))).status, 403);
+  Request foreign = Post("/api/reports", body, CookieOf("sue"));
+  foreign.origin = "http://evil.example";
+  EXPECT_EQ(Answer(foreign).status, 403);
+  const Response started = Answer(Post("/api/reports", body, CookieOf("sue")));
+  EXPECT_EQ(started.status, 202);
+  EXPECT_EQ(Json::parse(Body(started))["report_id"], "7");
+  EXPECT_EQ(Answer(Post("/api/reports", std::string(9, '['), CookieOf("sue"))).status, 400);
+  EXPECT_THAT(source_.asked(), ElementsAre("sue wants a report of 21 bytes"));
+  const Response file = Answer(Get("/api/reports/7/axis_check.csv", CookieOf("vera")));
+  EXPECT_EQ(file.status, 200);
+  EXPECT_EQ(Header(file, "Content-Type"), "text/csv; charset=utf-8");
+  EXPECT_EQ(Header(file, "Content-Disposition"), "attachment");
+  EXPECT_EQ(Body(file), "chainage_m\n");
+  EXPECT_EQ(Answer(Get("/api/reports/7/axis_check.csv")).status, 401);
+  for (const char* path : {"7",
+                           "7/",
+                           "/axis_check.csv",
+                           "7/none.csv",
+                           "7/../axis_check.csv",
+                           "../7",
+                           "7/axis%5fcheck.csv",
+                           "7/.axis_check.csv",
+                           "7/axis_check.csv/",
+                           "..",
+                           "./."}) {
+    EXPECT_EQ(Answer(Get(std::string("/api/reports/") + path, CookieOf("sue"))).status, 404)
+        << path;
+  }
+  // Only who is logged in may send that much.
+  EXPECT_EQ(router_->BodyLimit(Post("/api/reports", "")), options_.limits.body_bytes);
+  EXPECT_EQ(router_->BodyLimit(Post("/api/commands", "", CookieOf("sue"))),
+            options_.limits.body_bytes);
+  EXPECT_EQ(router_->BodyLimit(Post("/api/reports", "", CookieOf("sue"))),
+            options_.limits.report_bytes);
+}
+
 TEST_F(Gate, BodiesAreTakenExactly) {
   const std::string cookie = CookieOf("sue");
   struct Bad {
