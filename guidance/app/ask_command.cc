@@ -2,14 +2,15 @@
 
 #include <chrono>
 #include <optional>
-#include <random>
 #include <set>
 #include <thread>
 
 #include <fmt/format.h>
 
 #include "idl/cpp/publisher.h"
+#include "idl/cpp/request_id.h"
 #include "idl/cpp/subscriber.h"
+#include "idl/cpp/words.h"
 #include "pose/base/clock.h"
 
 namespace tbm {
@@ -19,31 +20,6 @@ using namespace std::chrono_literals;
 
 constexpr std::chrono::seconds kDiscovery{3};    // for a process that runs to be found
 constexpr std::chrono::seconds kFirstAnswer{5};  // within which it says at least "accepted"
-
-// One for each request, never used again.
-std::string NewRequestId() {
-  std::random_device device;
-  std::string id;
-  for (int part = 0; part < 4; ++part) {
-    if (part > 0) id += '-';
-    id += fmt::format("{:08x}", static_cast<std::uint32_t>(device()));
-  }
-  return id;
-}
-
-std::string_view WordOf(dds::CommandOutcome outcome) {
-  switch (outcome) {
-    case dds::CommandOutcome::kAccepted:
-      return "accepted";
-    case dds::CommandOutcome::kDone:
-      return "done";
-    case dds::CommandOutcome::kRefused:
-      return "refused";
-    case dds::CommandOutcome::kFailed:
-      return "failed";
-  }
-  return "";
-}
 
 ExitCode ExitOf(dds::CommandOutcome outcome) {
   switch (outcome) {
@@ -78,7 +54,7 @@ std::optional<std::string> MachineHeard(dds::Participant& participant, const Con
 dds::Command CommandOf(const AskRequest& request, const std::string& machine, Timestamp now) {
   dds::Command command;
   command.machine_id = std::string_view(machine);
-  command.request_id = std::string_view(NewRequestId());
+  command.request_id = std::string_view(dds::NewRequestId());
   command.addressee = std::string_view(request.addressee);
   command.verb = std::string_view(request.verb);
   command.argument = std::string_view(request.argument);
@@ -126,7 +102,7 @@ ExitCode RunAsk(const AskRequest& request, const Console& console) {
     if (!replies.Take(reply, facts, 100ms) || !(reply.request_id == command.request_id)) continue;
     console.out << fmt::format("{}: {}: {}\n",
                                reply.source.view(),
-                               WordOf(reply.outcome),
+                               dds::WordOf(reply.outcome),
                                reply.text.view())
                 << std::flush;
     if (reply.outcome != dds::CommandOutcome::kAccepted) return ExitOf(reply.outcome);

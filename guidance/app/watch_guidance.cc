@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "guidance/app/watch_text.h"
+#include "idl/cpp/words.h"
 #include "pose/base/angle.h"
 
 namespace tbm {
@@ -140,7 +141,7 @@ void AddAhead(const dds::Guidance& guidance, std::vector<WatchRow>& rows) {
 
 // "coasting 4 min, +-9 mm": how long without news, and what that has made of the deviation.
 WatchRow SourceRow(const dds::GuidanceSource& source, const dds::Guidance& guidance) {
-  std::string status(watch::FreshnessCode(source.freshness));
+  std::string status(dds::WordOf(source.freshness));
   if (std::isfinite(source.age_s)) status += " " + AgeText(source.age_s);
   const dds::GuidedPoint* const steered = watch::SteeredPoint(guidance);
   if (source.freshness == dds::SourceFreshness::kCoasting && steered) {
@@ -175,58 +176,6 @@ std::string StatusText(dds::Validity validity, std::string_view reason) {
                                                             : "none";
   if (!reason.empty()) text += " " + std::string(reason);
   return text;
-}
-
-std::string_view FreshnessCode(dds::SourceFreshness freshness) {
-  switch (freshness) {
-    case dds::SourceFreshness::kMissing:
-      return "missing";
-    case dds::SourceFreshness::kStale:
-      return "stale";
-    case dds::SourceFreshness::kCoasting:
-      return "coasting";
-    case dds::SourceFreshness::kFresh:
-      return "fresh";
-  }
-  return "";
-}
-
-std::string_view SetUpCode(dds::SetUpState state) {
-  switch (state) {
-    case dds::SetUpState::kNone:
-      return "none";
-    case dds::SetUpState::kSuspect:
-      return "suspect";
-    case dds::SetUpState::kGood:
-      return "good";
-  }
-  return "";
-}
-
-std::string_view PhaseCode(dds::AlarmPhase phase) {
-  switch (phase) {
-    case dds::AlarmPhase::kNormal:
-      return "normal";
-    case dds::AlarmPhase::kUnacknowledged:
-      return "unacknowledged";
-    case dds::AlarmPhase::kAcknowledged:
-      return "acknowledged";
-    case dds::AlarmPhase::kReturnedUnacknowledged:
-      return "returned_unacknowledged";
-  }
-  return "";
-}
-
-std::string_view UrgencyCode(dds::AlarmUrgency urgency) {
-  switch (urgency) {
-    case dds::AlarmUrgency::kLow:
-      return "low";
-    case dds::AlarmUrgency::kMedium:
-      return "medium";
-    case dds::AlarmUrgency::kHigh:
-      return "high";
-  }
-  return "";
 }
 
 const dds::GuidedPoint* SteeredPoint(const dds::Guidance& guidance) {
@@ -308,7 +257,7 @@ void GuidanceBoard::AppendAlarms(const WatchNow& now, std::vector<WatchRow>& row
     const dds::AlarmStatus& alarm = heard->message;
     const bool stands = alarm.phase == dds::AlarmPhase::kUnacknowledged ||
                         alarm.phase == dds::AlarmPhase::kAcknowledged;
-    std::string status(watch::PhaseCode(alarm.phase));
+    std::string status(dds::WordOf(alarm.phase));
     if (!alarm.acknowledged_by.empty()) status += " by " + std::string(alarm.acknowledged_by);
     if (is_shelved(alarm)) {
       status += fmt::format(", shelved until {} by {}",
@@ -333,7 +282,7 @@ void GuidanceBoard::AppendAlarms(const WatchNow& now, std::vector<WatchRow>& row
          value,
          "",
          has_begun ? AgeText(std::max(0.0, SecondsBetween(alarm.raised_at, now.utc))) : "",
-         fmt::format("{} {}", watch::UrgencyCode(alarm.urgency), status),
+         fmt::format("{} {}", dds::WordOf(alarm.urgency), status),
          style});
   }
 }
@@ -378,7 +327,7 @@ void GuidanceBoard::AppendSetUps(const WatchNow& now, std::vector<WatchRow>& row
                            Plain(set_up.closure_tolerance_m * kPerMille, 1),
                            set_up.closure_points);
     }
-    std::string status(watch::SetUpCode(set_up.state));
+    std::string status(dds::WordOf(set_up.state));
     if (!set_up.reason.empty()) status += " " + std::string(set_up.reason);
     WatchRow row{"station " + key,
                  value,

@@ -36,10 +36,6 @@ class GuidanceBoard {
 namespace watch {
 
 std::string StatusText(dds::Validity validity, std::string_view reason);  // "degraded few_prisms"
-std::string_view FreshnessCode(dds::SourceFreshness freshness);
-std::string_view SetUpCode(dds::SetUpState state);
-std::string_view PhaseCode(dds::AlarmPhase phase);
-std::string_view UrgencyCode(dds::AlarmUrgency urgency);
 
 // The point that one steers by; null when the message has none of that name.
 const dds::GuidedPoint* SteeredPoint(const dds::Guidance& guidance);

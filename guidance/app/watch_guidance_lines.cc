@@ -5,6 +5,7 @@
 #include "guidance/app/watch_board.h"
 #include "guidance/app/watch_guidance.h"
 #include "guidance/app/watch_text.h"
+#include "idl/cpp/words.h"
 #include "pose/base/angle.h"
 
 namespace tbm {
@@ -52,7 +53,7 @@ std::string WatchLine(const dds::Guidance& g, double age_s) {
   for (const dds::GuidedPoint& point : g.points) line += PointText(point);
   for (const dds::GuidanceSource& source : g.sources) {
     const std::string name = watch::Harmless(source.name);
-    line += fmt::format(" {}={}", name, watch::FreshnessCode(source.freshness));
+    line += fmt::format(" {}={}", name, dds::WordOf(source.freshness));
     line += Number(name + "_age_s", source.age_s, 1);
   }
   return line;
@@ -80,7 +81,7 @@ std::string WatchLine(const dds::StationSetUp& set_up, double age_s) {
                               set_up.published_at,
                               age_s,
                               is_stale,
-                              std::string(watch::SetUpCode(set_up.state))) +
+                              std::string(dds::WordOf(set_up.state))) +
                      " role=" + watch::Harmless(set_up.role) + Reason(set_up.reason);
   if (is_stale) return line;
   line += fmt::format(" set_up={}", set_up.set_up_number);
@@ -98,8 +99,8 @@ std::string WatchLine(const dds::AlarmStatus& alarm, double age_s) {
                   age_s,
                   watch::Harmless(alarm.source),
                   watch::Harmless(alarm.code),
-                  watch::PhaseCode(alarm.phase),
-                  watch::UrgencyCode(alarm.urgency));
+                  dds::WordOf(alarm.phase),
+                  dds::WordOf(alarm.urgency));
   if (!alarm.unit.empty()) line += Number("value", alarm.value, 3);
   if (!alarm.acknowledged_by.empty()) line += " by=" + QuotedText(alarm.acknowledged_by);
   if (alarm.shelved_until != dds::kNever) {
