@@ -43,6 +43,10 @@ std::string PlainAddress(asio::ip::address address) {
   if (address.is_v6() && address.to_v6().is_v4_mapped()) {
     address = asio::ip::make_address_v4(asio::ip::v4_mapped, address.to_v6());
   }
+  if (address.is_v6()) {
+    // Without the interface of a link's address: nobody else names it so.
+    return asio::ip::address_v6(address.to_v6().to_bytes()).to_string();
+  }
   return address.to_string();
 }
 
@@ -83,7 +87,8 @@ struct ConsoleServer::Core {
   ServerShared shared;
   std::unique_ptr<asio::ssl::context> tls;
   std::atomic<bool> is_notified{false};
-  std::shared_mutex running;  // held by those who use the context from outside
+  std::atomic<bool> has_told_accept{false};  // once, until one succeeds
+  std::shared_mutex running;                 // held by those who use the context from outside
   bool is_running = false;
   // Its connections go with it, while all above still is.
   std::unique_ptr<asio::io_context> context = std::make_unique<asio::io_context>(kThreads);
@@ -156,10 +161,11 @@ void ConsoleServer::Core::OnAccepted(tcp::acceptor& acceptor,
                                      tcp::socket socket) {
   if (error == asio::error::operation_aborted) return;
   if (!error) {
+    has_told_accept = false;
     Serve(std::move(socket));
     return Accept(acceptor);
   }
-  TellAccept(error);
+  if (!has_told_accept.exchange(true)) TellAccept(error);
   auto again = std::make_shared<asio::steady_timer>(acceptor.get_executor(), kAcceptAgain);
   again->async_wait([this, &acceptor, again](error_code aborted) {
     if (!aborted) Accept(acceptor);

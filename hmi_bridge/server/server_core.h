@@ -13,6 +13,7 @@
 #include "hmi_bridge/server/counters.h"
 #include "hmi_bridge/server/foxglove.h"
 #include "hmi_bridge/server/router.h"
+#include "hmi_bridge/server/secrets.h"
 #include "hmi_bridge/server/server_options.h"
 #include "hmi_bridge/server/static_files.h"
 #include "hmi_bridge/server/worker.h"
@@ -55,6 +56,7 @@ struct ServerShared {
   RawSource& raw;
   AuthStore& auth;
   const Clock& clock;
+  const std::string run = RandomToken(12);  // tells tools that the bridge has started anew
   Counters counters;
   StaticFiles files;
   Router router;

@@ -16,7 +16,6 @@
 #include <sys/socket.h>
 
 #include "hmi_bridge/server/live_feed.h"
-#include "hmi_bridge/server/secrets.h"
 
 namespace tbm::hmi {
 namespace {
@@ -249,7 +248,7 @@ class FoxgloveSocket final : public Socket {
 
  protected:
   void OnOpen() override {
-    texts_.push_back(FoxgloveServerInfo(shared_.options.product, RandomToken(8)));
+    texts_.push_back(FoxgloveServerInfo(shared_.options.product, shared_.run));
     texts_.push_back(FoxgloveAdvertise(shared_.raw.Channels()));
     Pump();
   }

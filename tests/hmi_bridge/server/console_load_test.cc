@@ -8,10 +8,12 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <poll.h>
 #include <unistd.h>
 
 #include "tests/hmi_bridge/server/server_fixture.h"
+#include "tests/support/process.h"
 
 namespace tbm::hmi {
 namespace {
@@ -88,6 +90,42 @@ TEST_F(Load, FiftyConsolesMissNoSecondWhileOneDoesNotRead) {
   RecordProperty("longest_gap_ms", std::to_string(gap_ms));
   std::printf("longest gap %.0f ms\n", gap_ms);
   EXPECT_LT(longest, 1s);
+}
+
+// foxglove.websocket.v1 as its own client library understands it.
+TEST_F(Load, ToolsOwnLibraryUnderstandsUs) {
+  options_.product = "tbm test";
+  Start();
+  const std::string modules = std::string(TBM_SOURCE_DIR) + "/build/npm/node_modules";
+  tbm::test::Process node({"node",
+                           std::string(TBM_SOURCE_DIR) + "/tests/npm/listen_foxglove.mjs",
+                           modules,
+                           "ws://" + Host() + "/foxglove?token=" + read_token_,
+                           "tbm/v1/event",
+                           "3"});
+  for (int i = 0; i < 2000 && !server_->HasListener(1); ++i) std::this_thread::sleep_for(10ms);
+  ASSERT_TRUE(server_->HasListener(1))
+      << node.Output() << "are the packages installed? tools/setup";
+  EXPECT_FALSE(server_->HasListener(0));
+  for (int i = 1; i <= 3; ++i) {
+    const std::vector<std::byte> cdr = {std::byte{0}, std::byte{1}, std::byte(0xa0 + i)};
+    server_->Publish(1, {1'790'000'000'000'000'000 + i}, cdr);
+  }
+  EXPECT_EQ(node.Wait(), 0);
+  std::vector<nlohmann::json> lines;
+  for (const std::string& line : node.Lines()) {
+    lines.push_back(nlohmann::json::parse(line, nullptr, false));
+  }
+  ASSERT_EQ(lines.size(), 6u) << node.Output();
+  EXPECT_EQ(lines[0]["serverInfo"]["name"], "tbm test");
+  EXPECT_EQ(lines[0]["serverInfo"]["capabilities"], nlohmann::json::array());
+  EXPECT_EQ(lines[1]["channel"]["schema"], raw_.Channels()[0].schema_text);
+  EXPECT_EQ(lines[2]["channel"]["topic"], "tbm/v1/event");
+  EXPECT_EQ(lines[2]["channel"]["encoding"], "cdr");
+  EXPECT_EQ(lines[2]["channel"]["schemaEncoding"], "omgidl");
+  EXPECT_EQ(lines[3]["timestamp"], "1790000000000000001");
+  EXPECT_EQ(lines[3]["bytes"], "0001a1");
+  EXPECT_EQ(lines[5]["bytes"], "0001a3");
 }
 
 TEST_F(Load, MemoryIsFlatOverAMillionMessages) {
