@@ -143,10 +143,10 @@ export const de: Language = {
     design: 'Achse',
     devices: 'Geräte',
     sources: 'Quellen',
-    source_station: 'Tachymeter',
+    source_station: 'Station',
     source_camera: 'Kamera',
-    source_tilt_target: 'Neigung vorn',
-    source_tilt_camera: 'Neigung hinten',
+    source_tilt_target: 'Neig. vorn',
+    source_tilt_camera: 'Neig. hinten',
     source_fresh: 'frisch',
     source_coasting: 'gekoppelt',
     source_stale: 'veraltet',
@@ -329,7 +329,7 @@ export const de: Language = {
   points: {cutter_face: 'Bohrkopf', front: 'Vorn', articulation: 'Gelenk', rear: 'Hinten', tail: 'Schildschwanz'},
   devices: {
     camera: 'Kamera', guidance: 'Steuerung', journal: 'Journal', total_station: 'Tachymeter',
-    inclinometer_camera: 'Neigung hinten', inclinometer_target: 'Neigung vorn', hmi_bridge: 'Konsolenbrücke',
+    inclinometer_camera: 'Neig. hinten', inclinometer_target: 'Neig. vorn', hmi_bridge: 'Konsolenbrücke',
   },
   reasons: {
     frame_missing: 'das Bild kam nie an',

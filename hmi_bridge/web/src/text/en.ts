@@ -141,7 +141,7 @@ export const ui = {
   design: 'Design',
   devices: 'Devices',
   sources: 'Sources',
-  source_station: 'Total station',
+  source_station: 'Station',
   source_camera: 'Camera',
   source_tilt_target: 'Tilt front',
   source_tilt_camera: 'Tilt rear',

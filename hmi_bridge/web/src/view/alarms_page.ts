@@ -25,7 +25,7 @@ function Row(app: App, alarm: Alarm): TemplateResult {
       <p class="cause"><b>${words.t(`urgency_${alarm.urgency}`)}</b> ${words.cause(alarm)}
         ${sections.alarms?.first_out === key ? html`<span class="first" title=${words.t('first_out_long')}>① ${words.t('first_out')}</span>` : nothing}</p>
       <p class="response"><small>${words.t('response')}:</small> ${words.response(alarm)}</p>
-      <p class="facts">
+      <p class="particulars">
         <span class="phase">${words.of('phase_', alarm.phase)}</span>
         ${alarm.raised_at_utc_ms === null ? nothing : html`<span>${words.t('alarm_raised', {time: DateTime(alarm.raised_at_utc_ms)})}</span>`}
         ${alarm.times_raised > 1 ? html`<span>${words.t('alarm_times', {n: alarm.times_raised})}</span>` : nothing}

@@ -29,10 +29,11 @@ export function Attitude(app: App, readings: Readings): TemplateResult {
       const reading = readings.get(id);
       if (!reading) return nothing;
       return html`<div class="cell" data-quality=${reading.judgement.quality}>
-        <span class="label" title=${reading.plus}>${reading.label} <span class="unit">${reading.unit}</span></span>
+        <span class="label" title=${reading.plus}>${reading.label}</span>
         ${NumberView(app, readings, id, {size: 'large'})}
         ${Gauge(reading)}
       </div>`;
     })}
+    <p class="cell note">${words.t('angles')}: ${words.t(`angles_${app.settings.angles}`)}</p>
   </section>`;
 }

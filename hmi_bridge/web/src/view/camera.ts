@@ -28,12 +28,12 @@ export function CameraPicture(app: App, isLarge: boolean): TemplateResult {
   const height = machine?.image_height_px || 1024;
   const factor = ResidualFactor(width);
   const isShown = frame && judged.quality !== 'missing';
-  const unit = width / (isLarge ? 900 : 340);  // image pixels to one of the screen, about
+  const unit = width / (isLarge ? 760 : 190);  // image pixels to one of the screen, about
   const leds = machine?.leds ?? [];
   const seen = new Set(frame?.spots.map((spot) => spot.led).filter((led) => led !== null));
   const lost = leds.filter((led) => !seen.has(led));
   return html`<figure class="panel camera ${isLarge ? 'large' : ''}" data-quality=${judged.quality}>
-    <figcaption><b>${words.t('camera_view')}</b>
+    <figcaption><b>${words.t(isLarge ? 'camera_view' : 'camera')}</b>
       ${frame ? html`<span>${words.t('camera_leds', {used: seen.size, all: leds.length})}</span><span class="factor">${words.t('camera_magnified', {factor})}</span>` : nothing}
     </figcaption>
     <div class="picture">

@@ -61,7 +61,7 @@ export function Page(app: App, sizes: Sizes): TemplateResult {
   }[app.route]();
   const isOpen = app.login === 'needed' || app.dialog !== null;
   return html`
-    <div class="app" data-connection=${app.live.state} data-route=${app.route} data-down=${app.live.state === 'down'}>
+    <div class="app" data-connection=${app.live.state} data-route=${app.route} data-down=${app.live.state === 'down'} data-shown-utc-ms=${app.sections.guidance?.timing.stamp_utc_ms ?? ''}>
       ${Header(app)}
       ${Navigation(app)}
       ${Banner(app)}

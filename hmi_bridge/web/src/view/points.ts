@@ -41,11 +41,11 @@ export function Points(app: App, readings: Readings): TemplateResult {
   return html`<section class="panel numbers" aria-label=${words.t('points')}>
     <header class="numbers-head" data-quality=${quality}>
       <b>${ShapeIcon(0, true)} ${steer ? words.point(steer) : '–'}</b>
-      <span class="state" data-quality=${quality}>${right ? (quality === 'ok' ? (isBeyond ? nothing : nothing) : QualityText(right.judgement, words)) : words.reason('never_heard')}</span>
+      <span class="state" data-quality=${quality}>${right ? (quality === 'ok' ? nothing : quality === 'missing' ? words.t('quality_missing') : QualityText(right.judgement, words)) : words.reason('never_heard')}</span>
       ${isBeyond ? html`<span class="beyond">▲ ${Fixed(off_mm, 0)} mm &gt; ${words.t('limit')} ${Fixed(limit_mm, 0)}</span>` : nothing}
     </header>
     <div class="bigs" data-beyond=${isBeyond}>${Big(app, readings, steer, 'right')}${Big(app, readings, steer, 'up')}</div>
-    <table class="points">
+    <div class="rows" tabindex="-1"><table class="points">
       <thead><tr>
         <th scope="col">${words.t('point')}</th>
         <th scope="col" class="num">${words.t(`column_right_${settings.signs}`)}</th>
@@ -53,15 +53,16 @@ export function Points(app: App, readings: Readings): TemplateResult {
         <th scope="col">${words.t('quality')}</th>
       </tr></thead>
       <tbody>${names.map((name, index) => {
+        if (name === steer) return nothing;  // it stands above, large
         const one = readings.get(`point.${name}.right`);
         return html`<tr data-point=${name} data-quality=${one?.judgement.quality ?? 'missing'}>
-          <th scope="row">${ShapeIcon(index, name === steer)}<span>${words.point(name)}</span></th>
+          <th scope="row">${ShapeIcon(index, false)}<span>${words.point(name)}</span></th>
           <td class="num">${NumberView(app, readings, `point.${name}.right`, {arrow: true})}</td>
           <td class="num">${NumberView(app, readings, `point.${name}.up`, {arrow: true})}</td>
           <td>${one ? QualityChip(one.judgement, words) : nothing}</td>
         </tr>`;
       })}</tbody>
-    </table>
+    </table></div>
     <p class="convention">${words.t(`convention_${settings.signs}`)}</p>
   </section>`;
 }

@@ -67,7 +67,7 @@ function References(app: App): TemplateResult {
       <tbody>${references.map((one) => html`<tr data-reference=${one.name} data-used=${one.used}>
         <th scope="row">${one.name}</th><td class="num">${Signed(one.across_mm, 1)}</td><td class="num">${Signed(one.up_mm, 1)}</td><td class="num">${Signed(one.slope_mm, 1)}</td>
         <td class="num">${Fixed(one.standardised, 1)}</td>
-        <td>${one.reason ? html`<span class="matter">${one.reason === 'control' ? '' : '◇ '}${words.reason(one.reason)}</span>` : words.t(one.used ? 'used' : 'not_used')}</td></tr>`)}</tbody></table>
+        <td>${one.reason ? one.reason === 'control' ? html`<span>${words.reason(one.reason)}</span>` : html`<span class="matter">◇ ${words.reason(one.reason)}</span>` : words.t(one.used ? 'used' : 'not_used')}</td></tr>`)}</tbody></table>
     <svg class="residuals" viewBox="-100 -100 200 200" role="img" aria-label=${words.t('references_picture')}>
       <g class="grid"><circle r=${scale * px}/><circle r=${(scale * px) / 2}/><path d="M-90 0H90M0-90V90"/></g>
       <text class="figure" x=${scale * px} y="11" text-anchor="middle">${scale}</text>

@@ -23,17 +23,18 @@ export function BendText(bend: Bend, words: Words): string {
     : words.t(`design_transition_${side}`);
 }
 
-export function DesignText(app: App): string {
+export function DesignText(app: App, axis: 'right' | 'up'): string {
   const {words, sections} = app;
   const machine = sections.machine;
   const chainage_m = SteerPoint(sections.guidance ?? null)?.chainage_m ?? null;
   const design = machine ? DesignAt(machine.axis, chainage_m, machine.axis_end_m) : null;
   if (!design) return words.t('design_unknown');
-  const parts = [BendText(design.now, words)];
-  if (design.next) parts.push(words.t('design_in', {what: BendText(design.next, words), m: Fixed(design.next.in_m, 0)}));
-  if (design.gradient_percent !== null) parts.push(words.t('design_gradient', {percent: Fixed(design.gradient_percent, 2)}));
-  if (design.next_gradient) parts.push(words.t('design_gradient_in', {percent: Fixed(design.next_gradient.percent, 2), m: Fixed(design.next_gradient.in_m, 0)}));
-  if (design.ends_in_m !== null) parts.push(words.t('design_ends', {m: Fixed(design.ends_in_m, 0)}));
+  const parts: string[] = [];
+  if (axis === 'right') parts.push(BendText(design.now, words));
+  if (axis === 'right' && design.next) parts.push(words.t('design_in', {what: BendText(design.next, words), m: Fixed(design.next.in_m, 0)}));
+  if (axis === 'up' && design.gradient_percent !== null) parts.push(words.t('design_gradient', {percent: Fixed(design.gradient_percent, 2)}));
+  if (axis === 'up' && design.next_gradient) parts.push(words.t('design_gradient_in', {percent: Fixed(design.next_gradient.percent, 2), m: Fixed(design.next_gradient.in_m, 0)}));
+  if (axis === 'right' && design.ends_in_m !== null) parts.push(words.t('design_ends', {m: Fixed(design.ends_in_m, 0)}));
   return parts.join(' · ');
 }
 
@@ -116,10 +117,9 @@ function Strip(app: App, readings: Readings, sizes: Sizes, axis: 'right' | 'up')
   return html`<figure class="panel strip" data-strip=${name} data-quality=${here_m === null ? 'missing' : judged.quality}>
     <figcaption><b>${words.t(name)}</b> <span class="side">+ ${words.t(axis)} ${axis === 'right' ? '▼' : '▲'} mm</span>
       ${guidance && isLive && guidance.ahead.length === 0 ? html`<span class="none">${words.t('prediction_none')}</span>` : nothing}
-      ${axis === 'up' ? html`<span class="grow"></span><label class="back">${words.t('look_back')}
-        <select aria-label=${words.t('look_back')} @change=${(event: Event) => app.change({behind_m: Number((event.target as HTMLSelectElement).value)})}>
-          ${BEHIND_CHOICES_M.map((m) => html`<option value=${m} ?selected=${settings.behind_m === m}>${m} m</option>`)}</select></label>`
-        : html`<span class="design">${DesignText(app)}</span>`}
+      <span class="design" title=${words.t('design')}>${DesignText(app, axis)}</span>
+      ${axis === 'up' ? html`<select title=${words.t('look_back')} aria-label=${words.t('look_back')} @change=${(event: Event) => app.change({behind_m: Number((event.target as HTMLSelectElement).value)})}>
+          ${BEHIND_CHOICES_M.map((m) => html`<option value=${m} ?selected=${settings.behind_m === m}>−${m} m</option>`)}</select>` : nothing}
     </figcaption>
     <div class="picture" ${sizes.watch(name)}>
       <svg width=${width} height=${height} viewBox="0 0 ${Math.max(width, 1)} ${Math.max(height, 1)}" role="img" aria-label=${words.t(axis === 'right' ? 'plan_strip' : 'profile_strip')}>${picture}</svg>
