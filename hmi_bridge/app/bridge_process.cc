@@ -31,6 +31,9 @@ constexpr std::int64_t kAuditLimit_bytes = 50'000'000;
 // An addressee that gets it later does not begin.
 constexpr std::chrono::seconds kCommandLives{30};
 
+// Longer without guidance, and the others' news goes out by itself.
+constexpr std::int64_t kPaceLost_ms = 300;
+
 // Of the command topic: what tools are passed on.
 constexpr int kOwnReaders = 1;
 
@@ -119,7 +122,10 @@ class BridgeProcess::Impl {
         board_.SetNetwork(participant_.IsRunning(), now);
         board_.Tick(now);
       }
-      if (ConsoleServer* server = server_.load()) server->Notify();
+      ConsoleServer* server = server_.load();
+      if (server != nullptr && SteadyMs(clock_.Steady()) - paced_steady_ms_ > kPaceLost_ms) {
+        server->Notify();
+      }
       if (on_alive) on_alive();
       std::this_thread::sleep_for(kTick);
     }
@@ -250,7 +256,12 @@ class BridgeProcess::Impl {
         const std::lock_guard lock(mutex_);
         board_.Add(message, arrival, Moment());
       }
-      server_.load()->Notify();
+      // Guidance sets the pace: what else is told goes out with it, a few milliseconds later, and
+      // so never makes it wait for its turn.
+      if constexpr (std::is_same_v<Message, dds::Guidance>) {
+        paced_steady_ms_ = arrival.heard_steady_ms;
+        server_.load()->Notify();
+      }
       PassOn(message);
     });
   }
@@ -304,6 +315,7 @@ class BridgeProcess::Impl {
   AuditLog audit_;
   dds::Publisher<dds::Command> commands_;
   std::atomic<ConsoleServer*> server_ = nullptr;
+  std::atomic<std::int64_t> paced_steady_ms_ = 0;
 
   std::mutex mutex_;  // guards board_
   ConsoleBoard board_;

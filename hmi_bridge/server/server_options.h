@@ -38,6 +38,8 @@ struct ServerLimits {
   std::chrono::milliseconds write{10'000};    // to take one message
   std::chrono::milliseconds silence{20'000};  // without any sign; asked for one at half of it
   std::chrono::milliseconds live_period{100};
+  // What is told within this belongs together and goes out as one.
+  std::chrono::milliseconds gather{8};
   std::chrono::milliseconds heartbeat{1'000};
   int logins_at_once = 5;
   std::chrono::milliseconds login_period{10'000};

@@ -1,5 +1,6 @@
 #include "hmi_bridge/server/web_sockets.h"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -178,6 +179,7 @@ class LiveSocket final : public Socket {
       is_poked_ = false;
       if (has_news_) return;
       has_news_ = true;
+      news_at_ = steady_clock::now();
       if (!is_writing() && !is_leaving()) Plan();
     });
   }
@@ -196,7 +198,8 @@ class LiveSocket final : public Socket {
  private:
   void Plan() {
     const auto& limits = shared_.options.limits;
-    const auto due = sent_at_ + (has_news_ ? limits.live_period : limits.heartbeat);
+    const auto due = has_news_ ? std::max(sent_at_ + limits.live_period, news_at_ + limits.gather)
+                               : sent_at_ + limits.heartbeat;
     if (due <= steady_clock::now()) return Send();
     WakeAt(due);
   }
@@ -212,6 +215,7 @@ class LiveSocket final : public Socket {
   LiveFeed feed_;
   std::atomic<bool> is_poked_{false};
   bool has_news_ = false;
+  steady_clock::time_point news_at_{};
   steady_clock::time_point sent_at_{};
 };
 
