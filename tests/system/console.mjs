@@ -2,10 +2,10 @@
 // process, guidance, bridge, and the page in Chromium. What fails is made to fail, and the page has to say so within
 // two seconds, and to recover by itself.
 //
-//   unshare -n node console.mjs BIN SOURCE PAGE [--shots FOLDER]      (root; a network of its own)
+//   node console.mjs BIN SOURCE PAGE [--shots FOLDER]      (root, for a network of its own)
 //
 // Prints a line for each check and a closing summary; exit code 1 when any failed, 77 when there is nothing to run on.
-import {execFileSync, spawn} from 'node:child_process';
+import {execFileSync, spawn, spawnSync} from 'node:child_process';
 import {copyFileSync, existsSync, mkdirSync, mkdtempSync, openSync, readFileSync, readdirSync, rmSync, writeFileSync} from 'node:fs';
 import {createRequire} from 'node:module';
 import {tmpdir} from 'node:os';
@@ -17,6 +17,11 @@ const require = createRequire(join(source, 'hmi_bridge/web/package.json'));
 if (process.getuid() !== 0 || !existsSync('/usr/bin/chromium')) {
   console.log('skipped: needs root, for a network of its own, and /usr/bin/chromium');
   process.exit(77);
+}
+if (!process.env.TBM_OWN_NETWORK) {
+  const own = spawnSync('unshare', ['--net', process.execPath, ...process.argv.slice(1)],
+    {stdio: 'inherit', env: {...process.env, TBM_OWN_NETWORK: '1'}});
+  process.exit(own.status ?? 1);
 }
 const {chromium} = require('playwright-core');
 const {WebSocket} = require('ws');
