@@ -394,6 +394,7 @@ TEST_F(Gate, ReportsAreForSurveyorsAndTheirFilesForAll) {
                            "7/",
                            "/axis_check.csv",
                            "7/none.csv",
+                           "8/axis_check.csv",
                            "7/../axis_check.csv",
                            "../7",
                            "7/axis%5fcheck.csv",
