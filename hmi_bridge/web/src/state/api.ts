@@ -1,5 +1,5 @@
 // The bridge's REST part. Nothing here throws: what went wrong is a value.
-import type {CommandRequest, History, Me} from './types';
+import type {CommandRequest, History, Me, ReportRequest} from './types';
 
 export type Outcome<T> = {ok: true; value: T} | {ok: false; status: number; error: string; text: string; retry_s: number | null};
 
@@ -23,6 +23,16 @@ export const api = {
   login: (name: string, password: string) => Post<Me>('/api/login', {name, password}),
   logout: () => Post<null>('/api/logout', {}),
   command: (request: CommandRequest) => Post<{request_id: string}>('/api/commands', request),
+  report: (request: ReportRequest) => Post<{report_id: string}>('/api/reports', request),
+  // The whole text, or null.
+  text: async (path: string): Promise<string | null> => {
+    try {
+      const answer = await fetch(path, {credentials: 'same-origin', cache: 'no-store', signal: AbortSignal.timeout(30_000)});
+      return answer.ok ? await answer.text() : null;
+    } catch {
+      return null;
+    }
+  },
   advance: (point: string, length_m: number) =>
     Ask<History>(`/api/advance?point=${encodeURIComponent(point)}&length_m=${length_m}`),
 };

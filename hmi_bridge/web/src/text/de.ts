@@ -475,6 +475,7 @@ export const de: Language = {
     total_station_silent: ['Das Programm des Tachymeters sagt nichts', 'Läuft total_station? Vermesser rufen'],
     no_network: ['Kein Netz: nichts kann kommen', 'Steckt das Netzkabel? Stimmt die Adresse?'],
     other_machine_file: ['Die Steuerung hat eine andere Maschinendatei als die Konsole', 'Vermesser rufen: gezeigte Grenzen und Achse können falsch sein'],
+    calibration_due: ['Eine Kalibrierung ist fällig oder überfällig', 'Neu kalibrieren lassen; Vermesser verständigen'],
     clock_disagrees: ['Uhren von Steuerung und Konsole widersprechen sich', 'Beide am selben Zeitserver stellen; bis dahin gelten Werte als veraltet'],
     second_writer: ['Zwei Programme senden dasselbe: welches stimmt, ist unbekannt', 'Das fremde beenden'],
     interface_mismatch: ['Ein Programm anderer Fassung ist im Netz', 'Alle Programme auf dieselbe Fassung bringen'],

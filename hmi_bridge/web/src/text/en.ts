@@ -490,6 +490,7 @@ export const alarms = {
   total_station_silent: ['The total station\'s process says nothing', 'Does the program total_station run? Call the surveyor'],
   no_network: ['No network: nothing can come', 'Is the network cable in? Is the address right?'],
   other_machine_file: ['Guidance was started with another machine file than the console', 'Call the surveyor: limits and design shown may be wrong'],
+  calibration_due: ['A calibration is due or overdue', 'Have it calibrated again; tell the surveyor'],
   clock_disagrees: ['Clocks of guidance and console disagree', 'Have both set by the same time server; until then values look stale'],
   second_writer: ['Two programs send the same topic: which is right is not known', 'End the one that does not belong here'],
   interface_mismatch: ['A program of another version is on the network', 'Bring all programs to the same version'],

@@ -60,13 +60,13 @@ export class Words {
     return own(this.table.devices, id) ?? Plain(id);
   }
 
-  // The process' own English says more (names, figures) and is shown to who reads it. The total
-  // station's particulars, behind the colon, stay behind a translated cause.
+  // The process' own English says more (names, figures) and is shown to who reads it. Particulars
+  // behind a colon, of the sources that say them so, stay behind a translated cause.
   cause(alarm: Pick<Alarm, 'source' | 'code' | 'cause'>): string {
     const row = own(this.table.alarms as Record<string, readonly [string, string]>, alarm.code);
     if (this.language === 'en') return alarm.cause || row?.[0] || Plain(alarm.code);
     if (!row) return alarm.cause || Plain(alarm.code);
-    const colon = alarm.source === 'total_station' ? alarm.cause.indexOf(': ') : -1;
+    const colon = alarm.source === 'total_station' || alarm.code === 'calibration_due' ? alarm.cause.indexOf(': ') : -1;
     return colon < 0 ? row[0] : `${row[0]} (${alarm.cause.slice(colon + 2).replace(/\.$/, '')})`;
   }
 

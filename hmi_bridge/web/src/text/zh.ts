@@ -475,6 +475,7 @@ export const zh: Language = {
     total_station_silent: ['全站仪程序无消息', '程序是否运行? 通知测量员'],
     no_network: ['无网络: 收不到任何数据', '网线是否插好? 地址是否正确?'],
     other_machine_file: ['导向与操作台使用的机器文件不同', '通知测量员: 显示的限值与轴线可能有误'],
+    calibration_due: ['某项标定到期或逾期', '安排重新标定; 通知测量员'],
     clock_disagrees: ['导向与操作台时钟不一致', '用同一时间服务器校时; 此前数值显示为过期'],
     second_writer: ['两个程序发送同一数据: 不知何者正确', '结束不应存在的那个'],
     interface_mismatch: ['网络上有其他版本的程序', '将所有程序升级到同一版本'],

@@ -40,14 +40,14 @@ export function CameraPicture(app: App, isLarge: boolean): TemplateResult {
       <svg viewBox="0 0 ${width} ${height}" role="img" aria-label=${words.t('camera_view')} stroke-width=${unit.toFixed(2)}>
         <rect class="image" width=${width} height=${height}/>
         ${isShown ? frame.spots.map((spot) => svg`
-          <g class="spot" data-led=${spot.led ?? ''} data-excluded=${spot.led !== null && spot.led === pose?.excluded_led}
+          <g class="spot" font-size=${(12 * unit).toFixed(1)} data-led=${spot.led ?? ''} data-excluded=${spot.led !== null && spot.led === pose?.excluded_led}
               transform="translate(${spot.u_px.toFixed(1)} ${spot.v_px.toFixed(1)})">
             ${spot.led === null
               ? svg`<path class="other" d="M${-5 * unit} ${-5 * unit}L${5 * unit} ${5 * unit}M${5 * unit} ${-5 * unit}L${-5 * unit} ${5 * unit}"/>`
               : svg`<circle class="led" r=${(5 * unit).toFixed(1)}/>`}
             ${spot.residual_u_px === null || spot.residual_v_px === null ? nothing
               : svg`<path class="residual" d="M0 0L${(spot.residual_u_px * factor).toFixed(1)} ${(spot.residual_v_px * factor).toFixed(1)}"/>`}
-            ${spot.led === null ? nothing : svg`<text x=${(9 * unit).toFixed(1)} y=${(-5 * unit).toFixed(1)} font-size=${(12 * unit).toFixed(1)}>${spot.led}${
+            ${spot.led === null ? nothing : svg`<text x=${(9 * unit).toFixed(1)} y=${(-5 * unit).toFixed(1)}>${spot.led}${
               spot.led === pose?.excluded_led ? ` ${words.t('camera_excluded')}` : ''}</text>`}
           </g>`) : nothing}
       </svg>

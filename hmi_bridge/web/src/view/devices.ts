@@ -28,7 +28,7 @@ export function Devices(app: App): TemplateResult {
       return html`<button type="button" class="chip" data-device=${device.id} data-state=${state} @click=${() => app.open({kind: 'device', id: device.id})}>
         <span class="mark" aria-hidden="true">${MARKS[state]}</span>
         <span class="name">${words.device(device.id)}</span>
-        <span class="state">${words.of('device_', state)}${state === 'streaming' ? nothing : html` ${ClockTime(since_utc_ms)}`}</span>
+        <span class="state">${words.of('device_', state)}${state === 'streaming' ? nothing : html`<span class="since">${ClockTime(since_utc_ms)}</span>`}</span>
       </button>`;
     })}
     ${guidance ? html`<span class="divider" aria-hidden="true"></span>${guidance.sources.map((source) => {

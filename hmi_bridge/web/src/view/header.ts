@@ -32,18 +32,18 @@ export function Connection(app: App): TemplateResult {
   if (!receipt) {
     const waited = ElapsedSince({at_utc_ms: 0, at_steady_ms: 0, ...app.started}, app.clocks());
     return waited < 1500
-      ? html`<span class="connection" data-state="connecting" role="status">${words.t('connecting')}</span>`
-      : html`<span class="connection" data-state="down" role="status"><span aria-hidden="true">✕</span> <b>${words.t('no_connection')}</b>
+      ? html`<span class="connection" data-state="connecting">${words.t('connecting')}</span>`
+      : html`<span class="connection" data-state="down"><span aria-hidden="true">✕</span> <b>${words.t('no_connection')}</b>
           <span>${words.t('no_connection_yet', {span: Span(waited)})}</span></span>`;
   }
   const elapsed = ElapsedSince(receipt, app.clocks());
   if (live.state !== 'live' || elapsed > 2000) {
-    return html`<span class="connection" data-state="down" role="status"><span aria-hidden="true">✕</span> <b>${words.t('no_connection')}</b>
+    return html`<span class="connection" data-state="down"><span aria-hidden="true">✕</span> <b>${words.t('no_connection')}</b>
       <span>${words.t('no_connection_since', {time: ClockTime(receipt.at_utc_ms), span: Span(elapsed)})}</span></span>`;
   }
   const dds = app.sections.bridge?.dds;
   if (dds && !dds.running) {
-    return html`<span class="connection" data-state="down" role="status"><span aria-hidden="true">✕</span> <b>${words.t('dds_down')}</b>
+    return html`<span class="connection" data-state="down"><span aria-hidden="true">✕</span> <b>${words.t('dds_down')}</b>
       <span>${words.t('since', {time: ClockTime(dds.since_utc_ms)})}</span></span>`;
   }
   return html`<span class="connection" data-state="live"><span aria-hidden="true">●</span> ${words.t('connected')}

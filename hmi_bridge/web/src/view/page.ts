@@ -49,7 +49,7 @@ function Notice(app: App): TemplateResult | typeof nothing {
 export function Page(app: App, sizes: Sizes): TemplateResult {
   const {words} = app;
   if (app.login !== 'in' && app.receipt === null) {
-    return html`<div class="gate">${app.login === 'needed' ? LoginForm(app, false) : html`<h1>${words.t('title')}</h1>${Connection(app)}`}</div>`;
+    return html`<main class="gate">${app.login === 'needed' ? LoginForm(app, false) : html`<h1>${words.t('title')}</h1>${Connection(app)}`}</main>`;
   }
   const body = {
     drive: () => DrivePage(app, sizes),

@@ -103,17 +103,15 @@ export function Target(app: App, readings: Readings): TemplateResult {
       ${trail.length > 1 ? svg`<polyline class="trail" points=${trail.map(([a, b]) => `${x(inside(a))},${y(inside(b))}`).join(' ')}/>` : nothing}
       ${ellipse && steered ? svg`<ellipse class="ellipse" rx=${(ellipse.major_mm * px).toFixed(1)} ry=${(ellipse.minor_mm * px).toFixed(1)}
           transform="translate(${x(steered.x_mm)} ${y(steered.y_mm)}) rotate(${(-ellipse.turned_deg).toFixed(1)})"/>` : nothing}
-      ${[...spots].sort((a, b) => Number(a.isSteered) - Number(b.isSteered)).map((spot) => {
+      ${labelled.map((spot) => {
         const px_x = inside(spot.x_mm) * px;
-        const isRight = px_x <= HALF - 90;
+        const side = px_x <= HALF - 90 ? 1 : -1;
         const isOut = Math.abs(spot.x_mm) > scale_mm || Math.abs(spot.y_mm) > scale_mm;
-        return svg`<g class="spot" data-point=${spot.name} data-quality=${spot.quality} data-steered=${spot.isSteered}
-            transform="translate(${px_x.toFixed(1)} ${y(inside(spot.y_mm))})">
-          ${PointShape(spot.index, spot.isSteered)}
-          ${labelled.includes(spot) ? svg`<text x=${isRight ? (spot.isSteered ? 18 : 11) : (spot.isSteered ? -18 : -11)} y=${spot.isSteered ? -6 : 4}
-            text-anchor=${isRight ? 'start' : 'end'}>${words.point(spot.name)}${isOut ? ` (${words.t('off_scale')})` : ''}</text>` : nothing}
-        </g>`;
+        return svg`<text class="name" data-steered=${spot.isSteered} x=${(px_x + side * (spot.isSteered ? 18 : 11)).toFixed(1)}
+          y=${(-inside(spot.y_mm) * px + (spot.isSteered ? -7 : 4)).toFixed(1)} text-anchor=${side === 1 ? 'start' : 'end'}>${words.point(spot.name)}${isOut ? ` (${words.t('off_scale')})` : ''}</text>`;
       })}
+      ${[...spots].sort((a, b) => Number(a.isSteered) - Number(b.isSteered)).map((spot) => svg`<g class="spot" data-point=${spot.name} data-quality=${spot.quality}
+          data-steered=${spot.isSteered} transform="translate(${x(inside(spot.x_mm))} ${y(inside(spot.y_mm))})">${PointShape(spot.index, spot.isSteered)}</g>`)}
     </svg>
     ${part.quality === 'stale' || part.quality === 'missing'
       ? html`<div class="veil" data-quality=${part.quality}><b>${words.t(`quality_${part.quality}`)}</b>
