@@ -52,7 +52,7 @@ class Row {
     return least;
   }
   std::string Name(const char* key) {
-    const std::string name = Text(key);
+    std::string name = Text(key);
     if (fault_.empty() && !IsName(name)) {
       Wrong(key, "must be 1 to 32 letters, digits, '.', '_' or '-'");
     }

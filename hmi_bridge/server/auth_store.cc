@@ -222,7 +222,7 @@ std::optional<std::string> AuthStore::SetPassword(const std::string& name,
                                                   std::string_view password) {
   if (auto fault = WhyNotPassword(name, password)) return fault;
   const PasswordHash hash = HashOf(password, limits_.log2_n);
-  const auto fault = Alter(users_, [&](std::vector<User>& users) -> std::optional<std::string> {
+  auto fault = Alter(users_, [&](std::vector<User>& users) -> std::optional<std::string> {
     const auto user = Named(users, name);
     if (user == users.end()) return NoSuch("user", name);
     user->password = hash;
@@ -244,7 +244,7 @@ std::optional<std::string> AuthStore::SetRole(const std::string& name, Role role
 }
 
 std::optional<std::string> AuthStore::RemoveUser(const std::string& name) {
-  const auto fault = Alter(users_, [&](std::vector<User>& users) -> std::optional<std::string> {
+  auto fault = Alter(users_, [&](std::vector<User>& users) -> std::optional<std::string> {
     const auto user = Named(users, name);
     if (user == users.end()) return NoSuch("user", name);
     // Without any user the next start would make the first one anew.

@@ -148,7 +148,7 @@ Response Router::Busy() {
   return response;
 }
 
-void Router::Tell(ServerEvent event) {
+void Router::Tell(const ServerEvent& event) {
   {
     const std::lock_guard lock(mutex_);
     if (events_.Take(std::string(Word(event.what)), clock_.Steady())) return;

@@ -85,7 +85,7 @@ class Router {
                        const std::string& password,
                        const Request& request);
   std::string SetCookie(std::string_view token, bool is_tls, std::int64_t seconds) const;
-  void Tell(ServerEvent event);
+  void Tell(const ServerEvent& event);
 
   const ServerOptions& options_;
   const StaticFiles& files_;
