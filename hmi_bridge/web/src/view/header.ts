@@ -12,6 +12,7 @@ const ICONS: Record<Route, TemplateResult> = {
   events: svg`<path d="M3 5h18M3 12h18M3 19h12"/>`,
   camera: svg`<path d="M2 6h5l2-2h6l2 2h5v14H2z"/><circle cx="12" cy="13" r="4"/>`,
   station: svg`<path d="M12 12L5 22M12 12l7 10M12 12v10M8 3h8v7H8zM16 6h3"/>`,
+  reports: svg`<path d="M5 2h10l4 4v16H5zM14 2v5h5"/><path d="M8 12h8M8 16h8"/>`,
   settings: svg`<path d="M3 6h10M19 6h2M3 12h2M11 12h10M3 18h8M17 18h4"/><circle cx="16" cy="6" r="2.5"/><circle cx="8" cy="12" r="2.5"/><circle cx="14" cy="18" r="2.5"/>`,
 };
 
@@ -73,15 +74,15 @@ export function Header(app: App): TemplateResult {
   const isNight = app.theme() === 'night';
   const next = LANGUAGES[(LANGUAGES.indexOf(settings.language) + 1) % LANGUAGES.length] ?? 'en';
   return html`<header class="top">
-    <strong class="machine" title=${words.t('machine')}>${machine || '–'}</strong>
+    <h1 class="machine" title=${words.t('machine')}>${machine || '–'}</h1>
     <time class="clock" title=${words.t('clock')}>${ClockTime(now)}</time>
     ${Connection(app)}
     <span class="axis" title=${words.t('axis')}><small>${words.t('axis')}</small> ${sections.guidance?.axis_name ?? sections.machine?.axis_name ?? '–'}</span>
     <span class="grow"></span>
     <a class="user" href="#/settings" title=${words.t('user')}><span>${me?.name ?? ''}</span><small>${me ? words.of('role_', me.role) : ''}</small></a>
-    <button type="button" class="theme" aria-label=${words.t('theme')} @click=${() => app.change({theme: isNight ? 'day' : 'night'})}>
+    <button type="button" class="theme" title=${words.t('theme')} @click=${() => app.change({theme: isNight ? 'day' : 'night'})}>
       <span aria-hidden="true">${isNight ? '☾' : '☼'}</span>${isNight ? words.t('night') : words.t('day')}</button>
-    <button type="button" class="language" aria-label="${words.t('language')}: ${settings.language}" @click=${() => app.change({language: next})}>
+    <button type="button" class="language" title=${words.t('language')} @click=${() => app.change({language: next})}>
       ${settings.language === 'zh' ? '中文' : settings.language.toUpperCase()}</button>
     ${SoundButton(app)}
   </header>`;

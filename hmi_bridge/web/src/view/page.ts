@@ -11,6 +11,7 @@ import {Connection, Header, Navigation} from './header';
 import {LoginForm} from './login';
 import {Points} from './points';
 import {NumberView} from './reading_view';
+import {ReportsPage} from './reports_page';
 import {SettingsPage} from './settings_page';
 import type {Sizes} from './sizes';
 import {StationPage} from './station_page';
@@ -57,6 +58,7 @@ export function Page(app: App, sizes: Sizes): TemplateResult {
     events: () => EventsPage(app),
     camera: () => CameraPage(app),
     station: () => StationPage(app),
+    reports: () => ReportsPage(app),
     settings: () => SettingsPage(app),
   }[app.route]();
   const isOpen = app.login === 'needed' || app.dialog !== null;
