@@ -1,12 +1,12 @@
 # Debian packages, made by tools/package/build:
 #   tbm-camera-box   what runs on the box: the program, its unit, its configuration (any architecture)
-#   tbm-tools        the PC's side: guidance, total_station, tbm, the simulators
+#   tbm-tools        the PC's side: guidance, total_station, hmi_bridge with its page, tbm, the simulators
 # Included at the end of the root CMakeLists.txt.
 
 set(package_dir ${CMAKE_CURRENT_LIST_DIR})
 
 # Only what is used becomes a dependency.
-foreach(program camera_box guidance total_station tbm tbm_sim camera_sim total_station_sim)
+foreach(program camera_box guidance total_station hmi_bridge tbm tbm_sim camera_sim total_station_sim)
   if(TARGET ${program})
     target_link_options(${program} PRIVATE -Wl,--as-needed)
   endif()
@@ -34,10 +34,11 @@ install(FILES ${package_dir}/box/serial.rules
 set(package_components camera_box)
 if(NOT CMAKE_CROSSCOMPILING)
   list(APPEND package_components tools)
-  install(TARGETS guidance total_station tbm tbm_sim camera_sim total_station_sim
+  install(TARGETS guidance total_station hmi_bridge tbm tbm_sim camera_sim total_station_sim
     RUNTIME DESTINATION bin COMPONENT tools)
+  install(DIRECTORY ${PROJECT_BINARY_DIR}/web/ DESTINATION share/tbm/console COMPONENT tools)
   install(FILES ${PROJECT_SOURCE_DIR}/README.md DESTINATION share/doc/tbm-tools COMPONENT tools)
-  foreach(part pose devices guidance)
+  foreach(part pose devices guidance hmi_bridge)
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${part}/app/example
       DESTINATION share/doc/tbm-tools COMPONENT tools)
   endforeach()
@@ -134,7 +135,8 @@ set(CPACK_DEBIAN_TOOLS_PACKAGE_SUGGESTS "gnuplot-nox")
 set(CPACK_COMPONENT_TOOLS_DESCRIPTION
 "guidance of a tunnel boring machine, and the surveyor's tools
 guidance and total_station say on DDS where both shields are against the
-design axis, and keep a journal; tbm solves recorded runs, checks against a
+design axis, and keep a journal; hmi_bridge is the operator's console for
+browsers; tbm solves recorded runs, checks against a
 total station, shows the live system and works on journals; the simulators
 stand in for camera, inclinometers and total station.")
 
