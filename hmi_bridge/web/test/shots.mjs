@@ -12,7 +12,7 @@ mkdirSync(values.shots, {recursive: true});
 const PC = [1280, 800];
 const SHOTS = [
   ['ok_day', 'ok', PC, {}], ['ok_night', 'ok', PC, {theme: 'night'}], ['degraded', 'degraded', PC, {}], ['coasting', 'coasting', PC, {}], ['stale', 'stale', PC, {}],
-  ['missing', 'missing', PC, {}], ['missing_night', 'missing', PC, {theme: 'night'}], ['beyond', 'beyond', PC, {}], ['zh', 'coasting', PC, {language: 'zh', signs: 'steer'}], ['de', 'missing', PC, {language: 'de'}],
+  ['missing', 'missing', PC, {}], ['missing_night', 'missing', PC, {theme: 'night'}], ['beyond', 'beyond', PC, {}], ['de_coasting', 'coasting', PC, {language: 'de'}], ['zh', 'coasting', PC, {language: 'zh', signs: 'steer'}], ['de', 'missing', PC, {language: 'de'}],
   ['de_steer_night', 'alarms', PC, {language: 'de', signs: 'steer', theme: 'night', angles: 'deg', chainage: 'internal'}],
   ['alarms', 'alarms', PC, {}, 'alarms'], ['alarms_zh', 'alarms', PC, {language: 'zh'}, 'alarms'], ['events', 'ok', PC, {}, 'events'], ['camera', 'degraded', PC, {}, 'camera'], ['settings', 'ok', PC, {}, 'settings'],
   ['station', 'move', PC, {}, 'station'], ['station_de', 'move', PC, {language: 'de'}, 'station'], ['station_night', 'ok', PC, {theme: 'night'}, 'station'],

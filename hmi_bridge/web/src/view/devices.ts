@@ -2,7 +2,7 @@
 import {html, nothing, type TemplateResult} from 'lit';
 
 import type {App} from '../state/app';
-import {ClockTime} from '../state/format';
+import {ClockTime, Span} from '../state/format';
 import {Judge} from '../state/freshness';
 import type {Device} from '../state/types';
 
@@ -36,7 +36,7 @@ export function Devices(app: App): TemplateResult {
       return html`<button type="button" class="chip source" data-source=${source.name} data-state=${freshness} @click=${() => app.open({kind: 'source', name: source.name})}>
         <span class="mark" aria-hidden="true">${{fresh: '●', coasting: '≈', stale: '▨', missing: '⊘'}[freshness]}</span>
         <span class="name">${words.of('source_', source.name)}</span>
-        <span class="state">${words.of('source_', freshness)}${freshness === source.freshness && freshness !== 'fresh' && source.age_s !== null ? html` ${Math.round(source.age_s)} s` : nothing}</span>
+        <span class="state">${words.of('source_', freshness)}${freshness === source.freshness && freshness !== 'fresh' && source.age_s !== null ? html`<span class="since">${Span(source.age_s * 1000)}</span>` : nothing}</span>
       </button>`;
     })}` : nothing}
   </footer>`;

@@ -5,7 +5,7 @@ import type {App} from '../state/app';
 import {Fixed} from '../state/format';
 import type {Readings} from '../state/readings';
 import {ARROWS} from '../state/signs';
-import {NumberView, QualityChip, QualityText, LastText} from './reading_view';
+import {MARKS, NumberView, QualityChip, QualityText, LastText} from './reading_view';
 import {ShapeIcon} from './target';
 
 function Big(app: App, readings: Readings, name: string, axis: 'right' | 'up'): TemplateResult {
@@ -19,9 +19,10 @@ function Big(app: App, readings: Readings, name: string, axis: 'right' | 'up'): 
     ? html`<span class="arrow" aria-hidden="true">${ARROWS[direction]}</span> ${words.t(`${settings.signs}_${direction}`)}`
     : reading && quality === 'stale'
       ? LastText(reading, words)
-      : reading ? words.reason(reading.judgement.reason) : words.reason('never_heard');
+      : reading && reading.judgement.reason !== readings.get(`point.${name}.right`)?.judgement.reason
+        ? words.reason(reading.judgement.reason) : words.t('quality_missing');
   return html`<div class="big" data-quality=${quality}>
-    <span class="label">${words.t(`column_${axis}_${settings.signs}`)} <span class="unit">mm</span></span>
+    <span class="label">${direction && quality !== 'ok' ? html`<span class="mark" aria-hidden="true">${MARKS[quality]}</span> ` : nothing}${words.t(`column_${axis}_${settings.signs}`)} <span class="unit">mm</span></span>
     ${reading ? NumberView(app, readings, id, {size: 'huge'}) : html`<span class="number huge" data-quality="missing"><span class="dashes">– –</span></span>`}
     <span class="under">${under}</span>
   </div>`;
@@ -41,7 +42,7 @@ export function Points(app: App, readings: Readings): TemplateResult {
   return html`<section class="panel numbers" aria-label=${words.t('points')}>
     <header class="numbers-head" data-quality=${quality}>
       <b>${ShapeIcon(0, true)} ${steer ? words.point(steer) : '–'}</b>
-      <span class="state" data-quality=${quality}>${right ? (quality === 'ok' ? nothing : quality === 'missing' ? words.t('quality_missing') : QualityText(right.judgement, words)) : words.reason('never_heard')}</span>
+      <span class="state" data-quality=${quality}>${right ? (quality === 'ok' ? nothing : QualityText(right.judgement, words)) : words.reason('never_heard')}</span>
       ${isBeyond ? html`<span class="beyond">▲ ${Fixed(off_mm, 0)} mm &gt; ${words.t('limit')} ${Fixed(limit_mm, 0)}</span>` : nothing}
     </header>
     <div class="bigs" data-beyond=${isBeyond}>${Big(app, readings, steer, 'right')}${Big(app, readings, steer, 'up')}</div>

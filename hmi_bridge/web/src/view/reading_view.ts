@@ -37,22 +37,16 @@ export function NumberView(app: App, readings: Readings, id: string, dress: Dres
   if (!reading) return nothing;
   const {words} = app;
   const {quality} = reading.judgement;
-  const isLive = quality === 'ok' || quality === 'degraded' || quality === 'coasting';
-  const label = [
-    reading.label,
-    isLive ? `${reading.text} ${reading.unit}` : quality === 'stale' ? words.t('quality_stale') : words.t('quality_missing'),
-    quality === 'ok' ? '' : QualityText(reading.judgement, words),
-    LastText(reading, words),
-  ].filter(Boolean).join(', ');
-  return html`<button type="button" class="number ${dress.size ?? 'row'}" data-id=${id} data-quality=${quality}
-      aria-label=${label} @click=${() => app.open({kind: 'reading', id})}>
-    ${quality === 'stale'
+  // For who hears the page: what it is before the number, what is the matter behind it.
+  const behind = [quality === 'ok' ? '' : QualityText(reading.judgement, words), LastText(reading, words)].filter(Boolean).join(', ');
+  return html`<button type="button" class="number ${dress.size ?? 'row'}" data-id=${id} data-quality=${quality} @click=${() => app.open({kind: 'reading', id})}>
+    <span class="sr">${reading.label}: </span>${quality === 'stale'
       ? html`<span class="stale-word">${words.t('quality_stale')}</span><s class="last">${reading.text}</s>`
       : quality === 'missing'
         ? html`<span class="dashes">${DASHES}</span>`
         : html`${quality === 'ok' ? nothing : html`<span class="mark" aria-hidden="true">${MARKS[quality]}</span>`}<span class="digits">${
             dress.arrow && reading.direction ? html`<span class="arrow" aria-hidden="true">${ARROWS[reading.direction]}</span>` : nothing}${reading.text}</span>${
-            dress.unit && reading.unit ? html`<span class="unit">${reading.unit}</span>` : nothing}`}
+            dress.unit && reading.unit ? html` <span class="unit">${reading.unit}</span>` : nothing}`}${behind ? html`<span class="sr"> ${behind}</span>` : nothing}
   </button>`;
 }
 

@@ -62,7 +62,7 @@ function References(app: App): TemplateResult {
   return html`<section class="panel references">
     <h2>${words.t('references')} ${set_up ? html`<small>${words.t(step === 'proposed' ? 'set_up_proposed' : 'set_up_in_use')}</small>` : nothing}</h2>
     ${references.length === 0 ? html`<p class="calm">${words.t('references_none')}</p>` : html`<div class="split">
-    <table><thead><tr><th scope="col">${words.t('reference')}</th><th scope="col" class="num">${words.t('across')} mm</th><th scope="col" class="num">${words.t('up')} mm</th>
+    <table><thead><tr><th scope="col">${words.t('point')}</th><th scope="col" class="num">${words.t('across')} mm</th><th scope="col" class="num">${words.t('up')} mm</th>
       <th scope="col" class="num">${words.t('slope')} mm</th><th scope="col" class="num">${words.t('standardised')}</th><th scope="col">${words.t('quality')}</th></tr></thead>
       <tbody>${references.map((one) => html`<tr data-reference=${one.name} data-used=${one.used}>
         <th scope="row">${one.name}</th><td class="num">${Signed(one.across_mm, 1)}</td><td class="num">${Signed(one.up_mm, 1)}</td><td class="num">${Signed(one.slope_mm, 1)}</td>

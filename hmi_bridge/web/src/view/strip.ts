@@ -6,7 +6,6 @@ import {Chainage, Fixed} from '../state/format';
 import {Judge} from '../state/freshness';
 import {DesignAt, type Bend} from '../state/design_ahead';
 import {SteerPoint, type Readings} from '../state/readings';
-import {BEHIND_CHOICES_M} from '../state/settings';
 import {ScaleFor, Ticks} from '../state/scale';
 import type {Words} from '../text/index';
 import type {Sizes} from './sizes';
@@ -118,8 +117,6 @@ function Strip(app: App, readings: Readings, sizes: Sizes, axis: 'right' | 'up')
     <figcaption><b>${words.t(name)}</b> <span class="side">+ ${words.t(axis)} ${axis === 'right' ? '▼' : '▲'} mm</span>
       ${guidance && isLive && guidance.ahead.length === 0 ? html`<span class="none">${words.t('prediction_none')}</span>` : nothing}
       <span class="design" title=${words.t('design')}>${DesignText(app, axis)}</span>
-      ${axis === 'up' ? html`<select title=${words.t('look_back')} aria-label=${words.t('look_back')} @change=${(event: Event) => app.change({behind_m: Number((event.target as HTMLSelectElement).value)})}>
-          ${BEHIND_CHOICES_M.map((m) => html`<option value=${m} ?selected=${settings.behind_m === m}>−${m} m</option>`)}</select>` : nothing}
     </figcaption>
     <div class="picture" ${sizes.watch(name)}>
       <svg width=${width} height=${height} viewBox="0 0 ${Math.max(width, 1)} ${Math.max(height, 1)}" role="img" aria-label=${words.t(axis === 'right' ? 'plan_strip' : 'profile_strip')}>${picture}</svg>
