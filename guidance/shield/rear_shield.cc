@@ -55,7 +55,7 @@ const Eigen::Vector3d& PlaceOf(const RearShieldProblem& problem, int prism) {
 std::optional<Eigen::Quaterniond> StartFromUp(const RearShieldProblem& problem,
                                               const Naming& naming) {
   const Eigen::Quaterniond level =
-      Eigen::Quaterniond::FromTwoVectors(problem.up->up_in_rear_shield, Eigen::Vector3d::UnitZ());
+      TurnBetween(problem.up->up_in_rear_shield, Eigen::Vector3d::UnitZ());
   Eigen::Vector3d body_mean = Eigen::Vector3d::Zero();
   Eigen::Vector3d site_mean = Eigen::Vector3d::Zero();
   int count = 0;

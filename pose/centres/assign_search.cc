@@ -86,7 +86,7 @@ class TiltSearch {
  public:
   TiltSearch(const Scene& scene, Candidates& found) : scene_(scene), found_(found) {
     const UpPair& ups = *scene.ups;
-    level_from_target_ = Eigen::Quaterniond::FromTwoVectors(ups.up_in_target, ups.up_in_camera);
+    level_from_target_ = TurnBetween(ups.up_in_target, ups.up_in_camera);
     tilt_sigma_rad_ = UpSigma(ups);
     focal_px_ = 0.5 * (scene.rig->camera.fx_px + scene.rig->camera.fy_px);
     for (const Led& led : scene.rig->leds) {

@@ -29,6 +29,26 @@ Eigen::Vector3d LogRotation(const Eigen::Quaterniond& rotation) {
   return (2.0 * std::atan2(sin_half, cos_half) / sin_half) * axis_part;
 }
 
+Eigen::Quaterniond TurnBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  // Nearer to opposite than this, a microradian, rounding says where the axis is.
+  constexpr double kOpposite = -1.0 + 1e-12;
+  const Eigen::Vector3d a = from.normalized();
+  const Eigen::Vector3d b = to.normalized();
+  const double cos_turn = b.dot(a);
+  Eigen::Quaterniond turn;
+  if (cos_turn < kOpposite) {
+    turn.w() = 0.0;
+    turn.vec() = (a - b).unitOrthogonal();
+    return turn;
+  }
+  const Eigen::Vector3d axis = a.cross(b);
+  const double twice_cos_half = std::sqrt((1.0 + cos_turn) * 2.0);
+  const double scale = 1.0 / twice_cos_half;
+  turn.vec() = axis * scale;
+  turn.w() = twice_cos_half * 0.5;
+  return turn;
+}
+
 PoseError ErrorBetween(const Rigid3& estimate, const Rigid3& truth) {
   PoseError e;
   e.head<3>() = LogRotation(truth.rotation * estimate.rotation.conjugate());

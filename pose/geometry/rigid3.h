@@ -37,6 +37,11 @@ Eigen::Quaterniond ExpRotation(const Eigen::Vector3d& turn_rad);
 // Inverse of ExpRotation, in (-pi, pi].
 Eigen::Vector3d LogRotation(const Eigen::Quaterniond& rotation);
 
+// The shortest rotation that brings the direction of `from` to that of `to`; where they are
+// opposite, one of the half turns that do. Eigen's FromTwoVectors bit for bit except for opposite
+// directions, for which that one brings a whole singular value decomposition to the compiler.
+Eigen::Quaterniond TurnBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
 // Covariance of a transform b_from_a. Rows and columns: rotation [rad] first, then translation [m],
 // each about / along the axes of b. The error vector e = (turn, shift) is defined by
 //   R_true = Exp(turn) R,   t_true = t + shift

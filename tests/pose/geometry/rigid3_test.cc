@@ -31,6 +31,27 @@ TEST(Rigid3, ObeysTheLawsOfAGroup) {
   }
 }
 
+TEST(Rigid3, TurnBetweenIsTheShortestAndKnowsOppositeDirections) {
+  Random random("rigid3 turn between");
+  for (int i = 0; i < 500; ++i) {
+    const Eigen::Vector3d from = random.Normal3(2.0);
+    const Eigen::Vector3d to = random.Normal3(0.1);
+    const Eigen::Quaterniond turn = TurnBetween(from, to);
+    EXPECT_NEAR(turn.norm(), 1.0, 1e-12);
+    EXPECT_LT((turn * from.normalized() - to.normalized()).norm(), 1e-10);
+    EXPECT_NEAR(turn.vec().dot(from), 0.0, 1e-12);
+    EXPECT_NEAR(turn.vec().dot(to), 0.0, 1e-12);
+    EXPECT_NEAR(TurnBetween(from, 2.0 * from).w(), 1.0, 1e-15);
+
+    for (const double off_by_rad : {0.0, 1e-12, 1e-7, 1e-5}) {
+      const Eigen::Vector3d opposite = -(ExpRotation(off_by_rad * from.unitOrthogonal()) * from);
+      const Eigen::Quaterniond half_turn = TurnBetween(from, opposite);
+      EXPECT_NEAR(half_turn.norm(), 1.0, 1e-4);
+      EXPECT_LT((half_turn * from.normalized() - opposite.normalized()).norm(), 2e-5) << off_by_rad;
+    }
+  }
+}
+
 TEST(Rigid3, ExpAndLogAgreeWithAngleAndAxisAtEveryAngle) {
   Random random("rigid3 exp");
   for (const double angle_rad :

@@ -58,8 +58,8 @@ TEST(StartPose, WorksWithAllLedsAtOneHeightWhereTheLinearFormCollapses) {
     // The target stands upright: its LEDs are at one height in the world, not only on the board.
     Truth truth = DrawTruth(random, {4.0, 4.0, 0.2, 0.0, 0.05});
     const Eigen::Vector3d up = truth.up_in_camera;
-    const Eigen::Quaterniond upright = Eigen::Quaterniond::FromTwoVectors(
-        truth.camera_from_target.rotation * Eigen::Vector3d::UnitY(), up);
+    const Eigen::Quaterniond upright =
+        TurnBetween(truth.camera_from_target.rotation * Eigen::Vector3d::UnitY(), up);
     const Eigen::AngleAxisd yaw(random.Uniform(-0.1, 0.1), up);
     truth.camera_from_target.rotation = yaw * (upright * truth.camera_from_target.rotation);
 
