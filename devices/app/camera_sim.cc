@@ -1,3 +1,5 @@
+#include <CLI/CLI.hpp>
+
 #include "devices/app/run_simulator.h"
 
 int main(int argc, char** argv) {
@@ -5,5 +7,6 @@ int main(int argc, char** argv) {
                "camera_sim");
   tbm::MachineOptions options;
   tbm::AddMachineOptions(app, options);
-  return tbm::RunSimulator(app, argc, argv, options);
+  if (const auto exit_code = tbm::ParseSimulator(app, argc, argv)) return *exit_code;
+  return tbm::RunSimulator("camera_sim", options);
 }

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include <CLI/CLI.hpp>
+
 #include "devices/app/fault_options.h"
 #include "devices/app/tunnel_options.h"
 #include "pose/base/clock.h"
@@ -85,6 +87,16 @@ void AddTunnelOptions(CLI::App& app, MachineOptions& o) {
   app.add_option("--chainage",
                  o.chainage_m,
                  "of the rear shield when the world begins, internal [m]; else 60 m into the axis");
+}
+
+std::optional<int> ParseSimulator(CLI::App& app, int argc, char** argv) {
+  constexpr int kWrongCommand = 2;
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kWrongCommand;
+  }
+  return {};
 }
 
 Result<SimulatedMachine, std::string> BuildMachine(const MachineOptions& options) {

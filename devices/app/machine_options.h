@@ -5,14 +5,16 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "devices/app/end_signals.h"
 #include "devices/app/gige_simulator.h"
 #include "devices/sim/camera_view.h"
 #include "devices/sim/world.h"
 #include "guidance/config/machine_file.h"
 #include "pose/base/result.h"
+
+namespace CLI {
+class App;
+}
 
 namespace tbm {
 
@@ -39,6 +41,9 @@ void AddMachineOptions(CLI::App& app, MachineOptions& options);
 
 // --machine and --chainage, after AddMachineOptions.
 void AddTunnelOptions(CLI::App& app, MachineOptions& options);
+
+// Reads the command line. The exit code where it is wrong or only asks for help.
+std::optional<int> ParseSimulator(CLI::App& app, int argc, char** argv);
 
 struct SimulatedMachine {
   std::shared_ptr<const sim::World> world;

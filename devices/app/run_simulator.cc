@@ -14,16 +14,9 @@ enum ExitCode { kDone = 0, kWrongCommand = 2, kDevice = 3 };
 
 }  // namespace
 
-int RunSimulator(CLI::App& app,
-                 int argc,
-                 char** argv,
+int RunSimulator(const char* program,
                  const MachineOptions& options,
                  const StartInstruments& start_instruments) {
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kWrongCommand;
-  }
   HoldSignals();
   const auto machine = BuildMachine(options);
   if (!machine) {
@@ -39,7 +32,7 @@ int RunSimulator(CLI::App& app,
   const Result<std::string, std::string> instruments =
       start_instruments ? start_instruments(*machine) : std::string();
   if (!instruments) {
-    fmt::print(stderr, "{}: {}\n", app.get_name(), instruments.error());
+    fmt::print(stderr, "{}: {}\n", program, instruments.error());
     return kDevice;
   }
   const auto camera =
@@ -47,7 +40,7 @@ int RunSimulator(CLI::App& app,
         truth.Write(shown.sensed_at);
       });
   if (!camera) {
-    fmt::print(stderr, "{}: {}\n", app.get_name(), camera.error());
+    fmt::print(stderr, "{}: {}\n", program, camera.error());
     return kDevice;
   }
   fmt::print("camera address={} serial={}\n", options.camera.address, options.camera.serial);

@@ -3,8 +3,6 @@
 #include <functional>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "devices/app/machine_options.h"
 #include "pose/base/result.h"
 
@@ -15,13 +13,9 @@ namespace tbm {
 using StartInstruments =
     std::function<Result<std::string, std::string>(const SimulatedMachine& machine)>;
 
-// A simulator program from command line to exit code: the world, the instruments, the camera that
-// looks at it, truth.csv where asked for; until a signal comes or the time is over.
-//
-// `options` are those that AddMachineOptions has tied to `app`.
-int RunSimulator(CLI::App& app,
-                 int argc,
-                 char** argv,
+// A simulator program behind its command line, to the exit code: the world, the instruments, the
+// camera that looks at it, truth.csv where asked for; until a signal comes or the time is over.
+int RunSimulator(const char* program,
                  const MachineOptions& options,
                  const StartInstruments& start_instruments = {});
 

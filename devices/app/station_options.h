@@ -5,10 +5,12 @@
 #include <string_view>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "devices/total_station/geocom_emulator.h"
 #include "pose/base/result.h"
+
+namespace CLI {
+class App;
+}
 
 namespace tbm {
 

@@ -2,6 +2,7 @@
 #include <utility>
 #include <vector>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "devices/app/run_simulator.h"
@@ -115,5 +116,6 @@ int main(int argc, char** argv) {
     total_station = std::move(seen).value();
     return Lines(tilts) + total_station->line() + "\n";
   };
-  return tbm::RunSimulator(app, argc, argv, options, start);
+  if (const auto exit_code = tbm::ParseSimulator(app, argc, argv)) return *exit_code;
+  return tbm::RunSimulator("tbm_sim", options, start);
 }

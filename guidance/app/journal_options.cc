@@ -53,6 +53,16 @@ constexpr const char* kReplayHelp =
 
 }  // namespace
 
+void AddNetworkOptions(CLI::App& command, LiveNetwork& network) {
+  command.add_option("--domain", network.domain_id, "DDS domain")
+      ->check(CLI::Range(0, 232))
+      ->capture_default_str();
+  command.add_option(
+      "--interface", network.interfaces, "address or name of a network interface; 127.0.0.1");
+  command.add_option(
+      "--peer", network.peers, "address of a machine to look for; none: by multicast");
+}
+
 CLI::App* AddRecord(CLI::App& app, JournalRequests& requests) {
   RecordRequest& request = requests.record;
   CLI::App* record = app.add_subcommand("record", "Journal of all live topics");

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "guidance/app/export_command.h"
+#include "guidance/app/live_network.h"
 #include "guidance/app/record_command.h"
 #include "guidance/app/repair_command.h"
 #include "guidance/app/replay_command.h"
@@ -18,6 +19,9 @@ struct JournalRequests {
   ExportRequest exported;
   ReplayRequest replay;
 };
+
+// --domain, --interface and --peer of a command that meets the live system.
+void AddNetworkOptions(CLI::App& command, LiveNetwork& network);
 
 // Each adds its command.
 CLI::App* AddRecord(CLI::App& app, JournalRequests& requests);

@@ -4,8 +4,6 @@
 #include <string>
 #include <vector>
 
-#include <CLI/App.hpp>
-
 #include "guidance/app/console.h"
 #include "idl/cpp/participant.h"
 
@@ -17,9 +15,6 @@ struct LiveNetwork {
   std::vector<std::string> interfaces;  // empty: 127.0.0.1
   std::vector<std::string> peers;       // empty: by multicast
 };
-
-// --domain, --interface and --peer.
-void AddNetworkOptions(CLI::App& command, LiveNetwork& network);
 
 // How a participant of this name takes part. Empty after complaining of what cannot be.
 std::optional<dds::ParticipantConfig> ParticipantOn(const LiveNetwork& network,
