@@ -56,7 +56,6 @@ ServerOptions OptionsOf(const BridgeConfig& config) {
   ServerOptions options;
   options.listen = config.listen;
   options.allowed_names = config.names;
-  options.limits.body_bytes = 300 * 1024;  // the shots of an accuracy report
   options.openapi_text = std::string(OpenApiText());
   options.product = fmt::format("tbm hmi_bridge {}", TBM_VERSION);
   options.on_event = LogServer;

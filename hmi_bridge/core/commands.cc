@@ -32,18 +32,6 @@ constexpr std::array<VerbRow, 11> kVerbs{{
     {"resume", Role::kSurveyor, false, true, false},
 }};
 
-std::string_view WordOf(Role role) {
-  switch (role) {
-    case Role::kViewer:
-      return "viewer";
-    case Role::kOperator:
-      return "operator";
-    case Role::kSurveyor:
-      return "surveyor";
-  }
-  return "";
-}
-
 Failure<ApiFault> Bad(std::string text) {
   return Failure<ApiFault>{ApiFault{400, "bad_request", std::move(text)}};
 }
@@ -90,8 +78,8 @@ Result<dds::Command, ApiFault> CommandOf(const CommandRequest& request,
     return Failure<ApiFault>{ApiFault{403,
                                       "forbidden",
                                       "'" + request.verb + "' is for the role " +
-                                          std::string(WordOf(row->role)) + "; you are " +
-                                          std::string(WordOf(role))}};
+                                          std::string(Word(row->role)) + "; you are " +
+                                          std::string(Word(role))}};
   }
   for (const auto& fault :
        {TextFault("argument", request.argument, decltype(command.argument)::capacity()),

@@ -122,18 +122,6 @@ Result<std::vector<Entry>, std::string> ReadList(std::string_view text,
 
 }  // namespace
 
-std::string_view Word(Role role) {
-  switch (role) {
-    case Role::kViewer:
-      return "viewer";
-    case Role::kOperator:
-      return "operator";
-    case Role::kSurveyor:
-      return "surveyor";
-  }
-  return "viewer";
-}
-
 std::optional<Role> RoleFromWord(std::string_view word) {
   for (const Role role : {Role::kViewer, Role::kOperator, Role::kSurveyor}) {
     if (Word(role) == word) return role;

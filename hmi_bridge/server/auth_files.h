@@ -14,7 +14,6 @@ namespace tbm::hmi {
 // What the files of the state folder say. JSON that a person can read; every key must be there and
 // no other, so that a slip of the editor is told and never half believed.
 
-std::string_view Word(Role role);
 std::optional<Role> RoleFromWord(std::string_view word);
 // Letters, digits, '.', '_', '-'; 1 to 32: what logs, headers and file lines take as it is.
 bool IsName(std::string_view name);

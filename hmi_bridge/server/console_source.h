@@ -15,6 +15,19 @@ namespace tbm::hmi {
 // Who may what; each role contains those before it.
 enum class Role { kViewer, kOperator, kSurveyor };
 
+// "viewer", "operator", "surveyor".
+constexpr std::string_view Word(Role role) {
+  switch (role) {
+    case Role::kViewer:
+      return "viewer";
+    case Role::kOperator:
+      return "operator";
+    case Role::kSurveyor:
+      return "surveyor";
+  }
+  return "";
+}
+
 // One part of what consoles show (openapi.yaml, `Sections`), made into text once for all of them.
 struct Section {
   std::string_view name;      // outlives the source

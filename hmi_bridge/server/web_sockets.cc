@@ -177,7 +177,7 @@ class LiveSocket final : public Socket {
     if (is_poked_.exchange(true)) return;
     asio::post(executor(), [self = shared_from_this(), this] {
       is_poked_ = false;
-      if (has_news_) return;
+      if (has_news_ && !IsPutOff()) return;
       has_news_ = true;
       news_at_ = steady_clock::now();
       if (!is_writing() && !is_leaving()) Plan();
@@ -198,10 +198,21 @@ class LiveSocket final : public Socket {
  private:
   void Plan() {
     const auto& limits = shared_.options.limits;
-    const auto due = has_news_ ? std::max(sent_at_ + limits.live_period, news_at_ + limits.gather)
-                               : sent_at_ + limits.heartbeat;
+    const auto due = has_news_ ? DueForNews() : sent_at_ + limits.heartbeat;
     if (due <= steady_clock::now()) return Send();
     WakeAt(due);
+  }
+  // News that comes as often as may be sent would wait as long each time, up to a whole period, if
+  // it came just behind a message once. Then the next news is waited for and goes out with it at
+  // once: one message is late and all later ones are not.
+  bool IsPutOff() const {
+    const auto& limits = shared_.options.limits;
+    return sent_at_ + limits.live_period > news_at_ + limits.gather + limits.live_period / 5;
+  }
+  steady_clock::time_point DueForNews() const {
+    const auto& limits = shared_.options.limits;
+    if (IsPutOff()) return sent_at_ + 2 * limits.live_period;
+    return std::max(sent_at_ + limits.live_period, news_at_ + limits.gather);
   }
   void Send() {
     if (!IsAllowed()) return;
