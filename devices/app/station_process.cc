@@ -91,6 +91,7 @@ void StationProcess::Hear(const dds::ShieldPose& pose) {
 }
 
 void StationProcess::Report(const dds::Alarm& alarm) {
+  if (!alarm.ChangesKind()) return;
   const std::lock_guard lock(mutex_);
   Raise(dds::AlarmCode(alarm.kind),
         alarm.active ? dds::Severity::kAlarm : dds::Severity::kInfo,

@@ -183,6 +183,7 @@ class GuidanceProcess::Impl {
   }
 
   void Report(const dds::Alarm& alarm) {
+    if (!alarm.ChangesKind()) return;
     const std::lock_guard lock(alarm_mutex_);
     if (reported_.size() < kMostReports) reported_.push_back(alarm);
   }

@@ -68,16 +68,12 @@ void WatchBoard::Add(const dds::Event& event, Instant received_at) {
   }
 }
 void WatchBoard::Add(const dds::Alarm& alarm) {
-  const std::string key = fmt::format("{} {} {}",
-                                      dds::AlarmCode(alarm.kind),
-                                      alarm.topic,
-                                      alarm.kind == dds::AlarmKind::kSilent ? alarm.text : "");
+  const std::string key =
+      fmt::format("{} {} {}", dds::AlarmCode(alarm.kind), alarm.topic, alarm.subject);
   if (alarm.active) {
     alarms_[key] = alarm;
   } else {
-    std::erase_if(alarms_, [&](const auto& item) {
-      return item.second.kind == alarm.kind && item.second.topic == alarm.topic;
-    });
+    alarms_.erase(key);
   }
 }
 

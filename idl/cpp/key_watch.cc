@@ -24,9 +24,10 @@ KeyWatch::Key* KeyWatch::Find(const Id& key) {
 }
 
 bool KeyWatch::Heard(Key& key, const Id& writer, Instant now) {
-  if (key.is_silent) raise_(AlarmKind::kSilent, false, fmt::format("{} is heard again", key.name));
+  if (key.is_silent)
+    raise_(AlarmKind::kSilent, false, key.name, fmt::format("{} is heard again", key.name));
   key.is_silent = false;
-  if (is_mute_) raise_(AlarmKind::kSilent, false, "samples arrive");
+  if (is_mute_) raise_(AlarmKind::kSilent, false, "", "samples arrive");
   is_mute_ = false;
   key.heard_at = now;
   if (writer == key.writer) return key.is_contested;
@@ -41,7 +42,7 @@ bool KeyWatch::Heard(Key& key, const Id& writer, Instant now) {
   if (!came_back) return key.is_contested;
   key.contested_until = now + kContestMemory;
   if (!key.is_contested) {
-    raise_(AlarmKind::kSecondWriter, true, fmt::format("{} has two writers", key.name));
+    raise_(AlarmKind::kSecondWriter, true, key.name, fmt::format("{} has two writers", key.name));
   }
   key.is_contested = true;
   return true;
@@ -50,7 +51,7 @@ bool KeyWatch::Heard(Key& key, const Id& writer, Instant now) {
 void KeyWatch::FallSilent(Key& key, const std::string& why) {
   if (key.is_silent || silent_after_.count() == 0) return;
   key.is_silent = true;
-  raise_(AlarmKind::kSilent, true, fmt::format("{} {}", key.name, why));
+  raise_(AlarmKind::kSilent, true, key.name, fmt::format("{} {}", key.name, why));
 }
 
 void KeyWatch::Left(const Id& key, const std::string& why) {
@@ -68,7 +69,7 @@ void KeyWatch::Matched(int writers, Instant now) {
   matched_writers_ = writers;
   if (writers == 0 && is_mute_) {
     is_mute_ = false;
-    raise_(AlarmKind::kSilent, false, "the writer that sent nothing has left");
+    raise_(AlarmKind::kSilent, false, "", "the writer that sent nothing has left");
   }
 }
 
@@ -79,13 +80,16 @@ void KeyWatch::Poll(Instant now) {
     }
     if (key.is_contested && now > key.contested_until) {
       key.is_contested = false;
-      raise_(AlarmKind::kSecondWriter, false, fmt::format("{} has one writer again", key.name));
+      raise_(AlarmKind::kSecondWriter,
+             false,
+             key.name,
+             fmt::format("{} has one writer again", key.name));
     }
   }
   if (silent_after_.count() > 0 && matched_writers_ > 0 && keys_.empty() && !is_mute_ &&
       now - matched_at_ > silent_after_) {
     is_mute_ = true;
-    raise_(AlarmKind::kSilent, true, "a writer is there, but not one sample has come");
+    raise_(AlarmKind::kSilent, true, "", "a writer is there, but not one sample has come");
   }
 }
 

@@ -18,7 +18,9 @@ class KeyWatch {
  public:
   using Id = std::array<std::uint8_t, 16>;  // instance handle or writer GUID
   using Instant = std::chrono::steady_clock::time_point;
-  using Raise = std::function<void(AlarmKind, bool active, const std::string& text)>;
+  // `name`: of the key; empty: of the topic.
+  using Raise =
+      std::function<void(AlarmKind, bool active, const std::string& name, const std::string& text)>;
 
   // silent_after 0: silence is normal. At most max_keys keys are watched, further ones are not.
   KeyWatch(std::chrono::milliseconds silent_after, std::size_t max_keys, Raise raise);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <sstream>
+#include <utility>
 
 #include "tbm_idl/interface_hash.h"
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
@@ -26,6 +28,13 @@ constexpr std::string_view kInterfaceUserData = TBM_INTERFACE_USER_DATA;
 std::string_view InterfaceIn(std::string_view user_data) {
   if (user_data.substr(0, kIdPrefix.size()) != kIdPrefix) return {};
   return user_data.substr(kIdPrefix.size());
+}
+
+// Two processes may have one name.
+std::string ProcessText(const rtps::GuidPrefix_t& process) {
+  std::ostringstream text;
+  text << process;
+  return text.str();
 }
 
 }  // namespace
@@ -87,6 +96,14 @@ void ParticipantCore::Watch() {
   while (!ending_.wait_for(lock, kWatchPeriod, [this] { return is_ending_; })) {
     FollowAddresses();
     for (Endpoint* endpoint : endpoints_) endpoint->Poll();
+    std::vector<Alarm> expired;
+    {
+      const std::lock_guard alarm_lock(alarm_mutex_);
+      expired = causes_.Expire(std::chrono::steady_clock::now());
+    }
+    lock.unlock();
+    Tell(std::move(expired));
+    lock.lock();
   }
 }
 
@@ -97,11 +114,12 @@ void ParticipantCore::FollowAddresses() {
   if (runs) Stop();
   if (addresses.empty()) {
     if (!is_waiting_) {
-      Raise(AlarmKind::kNoNetwork,
-            true,
-            "",
-            fmt::format("none of the interfaces [{}] has an IPv4 address; waiting",
-                        fmt::join(config_.interfaces, ", ")));
+      Raise({AlarmKind::kNoNetwork,
+             true,
+             "",
+             "",
+             fmt::format("none of the interfaces [{}] has an IPv4 address; waiting",
+                         fmt::join(config_.interfaces, ", "))});
     }
     is_waiting_ = true;
     return;
@@ -109,19 +127,20 @@ void ParticipantCore::FollowAddresses() {
   if (!Start(addresses)) {
     Stop();
     if (!has_failed_) {
-      Raise(AlarmKind::kStartFailed,
-            true,
-            "",
-            fmt::format("DDS does not start on {} in domain {}; trying again",
-                        fmt::join(addresses, ", "),
-                        config_.domain_id));
+      Raise({AlarmKind::kStartFailed,
+             true,
+             "",
+             "",
+             fmt::format("DDS does not start on {} in domain {}; trying again",
+                         fmt::join(addresses, ", "),
+                         config_.domain_id)});
     }
     has_failed_ = true;
     return;
   }
   const std::string now_on = fmt::format("DDS runs on {}", fmt::join(addresses, ", "));
-  if (is_waiting_) Raise(AlarmKind::kNoNetwork, false, "", now_on);
-  if (has_failed_) Raise(AlarmKind::kStartFailed, false, "", now_on);
+  if (is_waiting_) Raise({AlarmKind::kNoNetwork, false, "", "", now_on});
+  if (has_failed_) Raise({AlarmKind::kStartFailed, false, "", "", now_on});
   is_waiting_ = false;
   has_failed_ = false;
 }
@@ -149,8 +168,16 @@ void ParticipantCore::Stop() {
   entities_.participant->delete_contained_entities();
   fdds::DomainParticipantFactory::get_instance()->delete_participant(entities_.participant);
   entities_ = {};
-  const std::lock_guard lock(foreign_mutex_);
-  foreign_.clear();
+  {
+    const std::lock_guard lock(foreign_mutex_);
+    foreign_.clear();
+  }
+  std::vector<Alarm> ended;
+  {
+    const std::lock_guard lock(alarm_mutex_);
+    ended = causes_.EndOfNetwork();
+  }
+  Tell(std::move(ended));
 }
 
 void ParticipantCore::Attach(Endpoint& endpoint) {
@@ -165,11 +192,31 @@ void ParticipantCore::Detach(Endpoint& endpoint) {
   endpoints_.erase(std::remove(endpoints_.begin(), endpoints_.end(), &endpoint), endpoints_.end());
 }
 
-void ParticipantCore::Raise(AlarmKind kind,
-                            bool active,
-                            std::string topic,
-                            std::string text) const {
-  if (on_alarm_) on_alarm_({kind, active, std::move(topic), std::move(text)});
+void ParticipantCore::Raise(Alarm alarm) {
+  std::vector<Alarm> news;
+  {
+    const std::lock_guard lock(alarm_mutex_);
+    auto told = causes_.Told(std::move(alarm), std::chrono::steady_clock::now());
+    if (told) news.push_back(std::move(*told));
+  }
+  Tell(std::move(news));
+}
+
+// The handler may wait for a lock that is held by somebody who waits for DDS: it is called without
+// any of ours. Who comes while another thread tells leaves its news to that one.
+void ParticipantCore::Tell(std::vector<Alarm> news) {
+  std::unique_lock lock(alarm_mutex_);
+  untold_.insert(untold_.end(), news.begin(), news.end());
+  if (is_telling_) return;
+  is_telling_ = true;
+  while (!untold_.empty()) {
+    const Alarm alarm = untold_.front();
+    untold_.pop_front();
+    lock.unlock();
+    if (on_alarm_) on_alarm_(alarm);
+    lock.lock();
+  }
+  is_telling_ = false;
 }
 
 bool ParticipantCore::IsForeign(const rtps::GuidPrefix_t& process) const {
@@ -199,7 +246,11 @@ void ParticipantCore::on_participant_discovery(fdds::DomainParticipant*,
       was_foreign = foreign_.erase(process) > 0;
     }
     if (was_foreign) {
-      Raise(AlarmKind::kInterfaceMismatch, false, "", fmt::format("\"{}\" has left", name));
+      Raise({AlarmKind::kInterfaceMismatch,
+             false,
+             "",
+             ProcessText(process),
+             fmt::format("\"{}\" has left", name)});
     }
     return;
   }
@@ -214,14 +265,15 @@ void ParticipantCore::on_participant_discovery(fdds::DomainParticipant*,
   }
   if (!is_new) return;
   Raise(
-      AlarmKind::kInterfaceMismatch,
-      true,
-      "",
-      fmt::format("\"{}\" was built from other IDL files ({}) than this process ({}); its samples "
-                  "are refused: bring both to the same version",
-                  name,
-                  theirs,
-                  InterfaceIn(InterfaceId())));
+      {AlarmKind::kInterfaceMismatch,
+       true,
+       "",
+       ProcessText(process),
+       fmt::format("\"{}\" was built from other IDL files ({}) than this process ({}); its samples "
+                   "are refused: bring both to the same version",
+                   name,
+                   theirs,
+                   InterfaceIn(InterfaceId()))});
 }
 
 fdds::Topic* TopicIn(fdds::DomainParticipant& participant,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <deque>
 #include <mutex>
 #include <set>
 #include <string>
@@ -12,6 +13,7 @@
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 
+#include "idl/cpp/alarm_causes.h"
 #include "idl/cpp/participant.h"
 
 // Inside of idl/cpp: what participant, publisher and subscriber share. Nobody else includes it.
@@ -44,7 +46,7 @@ class ParticipantCore final : private fdds::DomainParticipantListener {
 
   void Attach(Endpoint& endpoint);
   void Detach(Endpoint& endpoint);
-  void Raise(AlarmKind kind, bool active, std::string topic, std::string text) const;
+  void Raise(Alarm alarm);
 
   // Whether the writer belongs to a process that was built from other IDL files.
   bool IsForeign(const rtps::GuidPrefix_t& process) const;
@@ -57,6 +59,7 @@ class ParticipantCore final : private fdds::DomainParticipantListener {
   void FollowAddresses();  // with mutex_ held
   bool Start(const std::vector<std::string>& addresses);
   void Stop();
+  void Tell(std::vector<Alarm> news);
   void on_participant_discovery(fdds::DomainParticipant* participant,
                                 rtps::ParticipantDiscoveryInfo&& info) override;
 
@@ -75,6 +78,11 @@ class ParticipantCore final : private fdds::DomainParticipantListener {
 
   mutable std::mutex foreign_mutex_;  // taken inside DDS callbacks, never while asking for mutex_
   std::set<rtps::GuidPrefix_t> foreign_;
+
+  std::mutex alarm_mutex_;  // guards all below; the handler is called without it
+  AlarmCauses causes_;
+  std::deque<Alarm> untold_;
+  bool is_telling_ = false;
 
   std::thread watcher_;
 };

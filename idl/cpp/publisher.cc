@@ -69,8 +69,11 @@ class Publisher<Message>::Impl final : public Endpoint, private fdds::DataWriter
       writer_ = publisher_->create_datawriter(topic, WriterQosFor(kTopic.qos), this, kStatuses);
     }
     if (writer_ == nullptr) {
-      core_.Raise(
-          AlarmKind::kStartFailed, true, std::string(kTopic.name), "no writer could be made");
+      core_.Raise({AlarmKind::kStartFailed,
+                   true,
+                   std::string(kTopic.name),
+                   "writer",
+                   "no writer could be made"});
       return;
     }
     for (const Message& message : standing_) {
@@ -114,11 +117,13 @@ class Publisher<Message>::Impl final : public Endpoint, private fdds::DataWriter
   }
   void on_offered_incompatible_qos(fdds::DataWriter*,
                                    const fdds::OfferedIncompatibleQosStatus& status) override {
-    core_.Raise(AlarmKind::kIncompatibleQos,
-                true,
-                std::string(kTopic.name),
-                fmt::format("a reader asks for {} that this writer does not offer: it gets nothing",
-                            PolicyName(status.last_policy_id)));
+    core_.Raise(
+        {AlarmKind::kIncompatibleQos,
+         true,
+         std::string(kTopic.name),
+         "writer",
+         fmt::format("a reader asks for {} that this writer does not offer: it gets nothing",
+                     PolicyName(status.last_policy_id))});
   }
 
   ParticipantCore& core_;

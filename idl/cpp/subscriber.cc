@@ -73,11 +73,12 @@ class Subscriber<Message>::Impl final : public Endpoint, private fdds::DataReade
         handler_(std::move(handler)),
         options_(options),
         type_(new WireType<Message>),
-        watch_(options.silent_after.count() > 0 ? options.silent_after : kRule.deadline,
-               static_cast<std::size_t>(kRule.max_keys),
-               [this](AlarmKind kind, bool active, const std::string& text) {
-                 core_.Raise(kind, active, std::string(kTopic.name), text);
-               }) {
+        watch_(
+            options.silent_after.count() > 0 ? options.silent_after : kRule.deadline,
+            static_cast<std::size_t>(kRule.max_keys),
+            [this](AlarmKind kind, bool active, const std::string& name, const std::string& text) {
+              core_.Raise({kind, active, std::string(kTopic.name), name, text});
+            }) {
     TBM_CHECK(options_.silent_after.count() == 0 || options_.silent_after >= kRule.deadline);
     TBM_CHECK(options_.queue_capacity > 0);
     if (!handler_) queue_.resize(options_.queue_capacity);
@@ -109,8 +110,11 @@ class Subscriber<Message>::Impl final : public Endpoint, private fdds::DataReade
           topic, ReaderQosFor(kTopic.qos, options_.silent_after), this, Statuses());
     }
     if (reader_ == nullptr) {
-      core_.Raise(
-          AlarmKind::kStartFailed, true, std::string(kTopic.name), "no reader could be made");
+      core_.Raise({AlarmKind::kStartFailed,
+                   true,
+                   std::string(kTopic.name),
+                   "reader",
+                   "no reader could be made"});
     }
   }
 
@@ -206,10 +210,11 @@ class Subscriber<Message>::Impl final : public Endpoint, private fdds::DataReade
     const auto now = std::chrono::steady_clock::now();
     if (rejected > 1 && now - rejected_alarm_at_ < kRejectedAlarmPeriod) return;
     rejected_alarm_at_ = now;
-    core_.Raise(AlarmKind::kRejected,
-                true,
-                std::string(kTopic.name),
-                fmt::format("a sample is refused: {}; {} so far", FaultText(fault), rejected));
+    core_.Raise({AlarmKind::kRejected,
+                 true,
+                 std::string(kTopic.name),
+                 "",
+                 fmt::format("a sample is refused: {}; {} so far", FaultText(fault), rejected)});
   }
 
   void Enqueue(const SampleFacts& facts) {
@@ -246,13 +251,13 @@ class Subscriber<Message>::Impl final : public Endpoint, private fdds::DataReade
   }
   void on_requested_incompatible_qos(fdds::DataReader*,
                                      const fdds::RequestedIncompatibleQosStatus& status) override {
-    core_.Raise(
-        AlarmKind::kIncompatibleQos,
-        true,
-        std::string(kTopic.name),
-        fmt::format("a writer does not offer the {} that this reader asks for: nothing comes "
-                    "from it",
-                    PolicyName(status.last_policy_id)));
+    core_.Raise({AlarmKind::kIncompatibleQos,
+                 true,
+                 std::string(kTopic.name),
+                 "reader",
+                 fmt::format("a writer does not offer the {} that this reader asks for: nothing "
+                             "comes from it",
+                             PolicyName(status.last_policy_id))});
   }
   void on_sample_lost(fdds::DataReader*, const fdds::SampleLostStatus& status) override {
     const std::lock_guard lock(counters_mutex_);

@@ -85,6 +85,7 @@ void CameraBox::Run(std::stop_token stop, const std::function<void()>& on_alive)
 }
 
 void CameraBox::Report(const dds::Alarm& alarm) {
+  if (!alarm.ChangesKind()) return;
   health_.Raise("dds",
                 dds::AlarmCode(alarm.kind),
                 dds::Severity::kAlarm,

@@ -140,7 +140,8 @@ TEST(WatchBoard, HealthIsStaleAfterItsOwnDeadline) {
 
 TEST(WatchBoard, AlarmsStandUntilTheyAreTakenBack) {
   WatchBoard board;
-  dds::Alarm alarm{dds::AlarmKind::kInterfaceMismatch, true, "", "built from other files"};
+  dds::Alarm alarm{
+      dds::AlarmKind::kInterfaceMismatch, true, "", "a program", "built from other files"};
   board.Add(alarm);
   EXPECT_EQ(RowOf(board, NowAfter({}), "alarm interface_mismatch").style, WatchStyle::kBad);
   alarm.active = false;

@@ -27,9 +27,10 @@ class KeyWatchTest : public testing::Test {
 
   KeyWatch::Instant now_{1h};
   std::vector<std::pair<AlarmKind, bool>> raised_;
-  KeyWatch watch_{500ms, 4, [this](AlarmKind kind, bool active, const std::string&) {
-                    raised_.emplace_back(kind, active);
-                  }};
+  KeyWatch watch_{
+      500ms, 4, [this](AlarmKind kind, bool active, const std::string&, const std::string&) {
+        raised_.emplace_back(kind, active);
+      }};
 };
 
 TEST_F(KeyWatchTest, SaysOnceThatAKeyIsSilentAndOnceThatItIsBack) {

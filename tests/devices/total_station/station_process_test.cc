@@ -302,7 +302,7 @@ TEST_F(StationRuns, WorksBeatsAndListensAtOnce) {
     command.argument = "low_power";
     command.expires_at = clock.Now() + 10s;
     process.Hear(command);
-    process.Report({dds::AlarmKind::kSilent, true, "topic", "text"});
+    process.Report({dds::AlarmKind::kSilent, true, "topic", "key", "text"});
     std::this_thread::sleep_for(20ms);
   }
   EXPECT_GT(sink.good, 5);
