@@ -3,7 +3,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -11,13 +10,13 @@
 #include <signal.h>
 
 #include "devices/app/end_signals.h"
+#include "devices/app/service_run.h"
 #include "devices/app/station_process.h"
 #include "devices/total_station/make_total_station.h"
 #include "guidance/config/machine_file.h"
 #include "idl/cpp/dds_process.h"
 #include "idl/cpp/publisher.h"
 #include "idl/cpp/subscriber.h"
-#include "pose/app/service_manager.h"
 
 namespace tbm {
 namespace {
@@ -86,7 +85,6 @@ int Run(const StationConfig& config,
       MakeTotalStation(config.instrument, clock, sleeper);
   StationProcess process(config, machine, *instrument, clock, sleeper, sink);
   alarms.SendTo([&process](const dds::Alarm& alarm) { process.Report(alarm); });
-  std::stop_source stop;
   {
     const dds::Subscriber<dds::ShieldPose> poses(
         participant,
@@ -100,13 +98,9 @@ int Run(const StationConfig& config,
                TBM_VERSION,
                machine.machine_id,
                config.dds.domain);
-    std::jthread ending([&stop] {
-      WaitForEnd(0.0);
-      stop.request_stop();
+    RunService(clock, [&process](const std::stop_token& stop, const auto& on_alive) {
+      process.Run(stop, on_alive);
     });
-    ServiceManager manager(clock);
-    process.Run(stop.get_token(), [&manager] { manager.TellAlive(); });
-    manager.TellStopping();
   }
   alarms.SendTo({});
   fmt::print(stderr, "source=total_station code=ended\n");

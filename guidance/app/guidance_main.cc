@@ -1,7 +1,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -9,11 +8,11 @@
 #include <signal.h>
 
 #include "devices/app/end_signals.h"
+#include "devices/app/service_run.h"
 #include "guidance/app/exit_code.h"
 #include "guidance/app/guidance_process.h"
 #include "guidance/config/guidance_file.h"
 #include "idl/cpp/dds_process.h"
-#include "pose/app/service_manager.h"
 #include "pose/base/clock.h"
 
 namespace tbm {
@@ -76,15 +75,9 @@ int Main(const std::string& config_file, bool check_only) {
              machine->machine.machine_id,
              config->dds.domain,
              machine->axis.file_sha256());
-  std::stop_source stop;
-  std::thread ending([&stop] {
-    WaitForEnd(0.0);
-    stop.request_stop();
+  RunService(clock, [&process](const std::stop_token& stop, const auto& on_alive) {
+    process.Run(stop, on_alive);
   });
-  ServiceManager manager(clock);
-  process.Run(stop.get_token(), [&manager] { manager.TellAlive(); });
-  manager.TellStopping();
-  ending.join();
   alarms.SendTo({});
   fmt::print(stderr, "source=guidance code=ended\n");
   return static_cast<int>(ExitCode::kDone);

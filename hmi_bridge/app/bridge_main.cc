@@ -3,14 +3,15 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include "devices/app/end_signals.h"
+#include "devices/app/service_run.h"
 #include "guidance/app/exit_code.h"
 #include "guidance/config/guidance_file.h"
 #include "hmi_bridge/app/account_commands.h"
@@ -22,7 +23,6 @@
 #include "hmi_bridge/server/console_server.h"
 #include "hmi_bridge/server/tls_files.h"
 #include "idl/cpp/dds_process.h"
-#include "pose/app/service_manager.h"
 #include "pose/base/clock.h"
 
 namespace tbm::hmi {
@@ -111,7 +111,13 @@ ReportPlaces PlacesOf(const BridgeConfig& config, const GuidedMachine& machine) 
           Absolute(config.journal_folder)};
 }
 
+// What goes into the system's log is read by many: there it is told where the password stands.
 void TellFirstUser(const FirstUser& user) {
+  if (isatty(STDERR_FILENO) == 0) {
+    fmt::print(
+        stderr, "source=hmi_bridge code=first_user name={} password_in={}\n", user.name, user.file);
+    return;
+  }
   fmt::print(
       stderr,
       "\n  The console has no user yet. Log in as\n\n      {}\n      {}\n\n"
@@ -165,15 +171,9 @@ ExitCode Run(const BridgeConfig& config,
   }
   if (first.value()) TellFirstUser(*first.value());
 
-  std::stop_source stop;
-  std::thread ending([&stop] {
-    WaitForEnd(0.0);
-    stop.request_stop();
+  RunService(clock, [&process](const std::stop_token& stop, const auto& on_alive) {
+    process.Run(stop, on_alive);
   });
-  ServiceManager manager(clock);
-  process.Run(stop.get_token(), [&manager] { manager.TellAlive(); });
-  manager.TellStopping();
-  ending.join();
   alarms.SendTo({});
   process.StopListening();
   server.Stop();
@@ -197,9 +197,8 @@ ExitCode Main(const std::string& config_file, bool check_only) {
   const auto web = FindWebFolder(config->web_folder);
   if (!web) faults.push_back(fmt::format("{}: web: {}", config_file, web.error()));
   ServerOptions options = OptionsOf(*config);
-  // Its own certificate is made when it is needed; that there is one makes all the difference here.
-  for (const std::string& problem :
-       config->tls_self_signed ? std::vector<std::string>{} : Problems(options)) {
+  // Its own certificate is made when it is needed.
+  for (const std::string& problem : Problems(options, config->tls_self_signed)) {
     faults.push_back(fmt::format("{}: {}", config_file, problem));
   }
   if (!faults.empty()) return Refuse(faults);

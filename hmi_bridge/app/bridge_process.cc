@@ -76,9 +76,7 @@ class BridgeProcess::Impl {
         audit_(state_folder.PathOf("audit.log"), kAuditLimit_bytes),
         commands_(participant),
         board_(std::move(machine), std::move(facts), Moment()),
-        reports_(std::move(report_places), state_folder.PathOf("reports"), clock, [this] {
-          if (ConsoleServer* server = server_.load()) server->Notify();
-        }) {
+        reports_(std::move(report_places), state_folder.PathOf("reports"), clock) {
     board_.own_alarms().Restore(answers_.Load());
   }
 
@@ -116,12 +114,17 @@ class BridgeProcess::Impl {
 
   void Run(const std::stop_token& stop, const std::function<void()>& on_alive) {
     while (!stop.stop_requested()) {
+      // Asked before our lock is taken: DDS holds its own while it reports an alarm.
+      const bool is_running = participant_.IsRunning();
+      std::vector<std::string> news;
       {
         const std::lock_guard lock(mutex_);
         const hmi::Moment now = Moment();
-        board_.SetNetwork(participant_.IsRunning(), now);
+        board_.SetNetwork(is_running, now);
         board_.Tick(now);
+        news = board_.own_alarms().TakeNews();
       }
+      for (const std::string& line : news) fmt::print(stderr, "{}\n", line);
       ConsoleServer* server = server_.load();
       if (server != nullptr && SteadyMs(clock_.Steady()) - paced_steady_ms_ > kPaceLost_ms) {
         server->Notify();
@@ -178,7 +181,12 @@ class BridgeProcess::Impl {
       return ApiFault{
           503, "cannot_send", "the audit log cannot be written, and nothing is done without it"};
     }
-    return Send(command, request_id);
+    const ApiAnswer answer = Send(command, request_id);
+    if (const auto* fault = std::get_if<ApiFault>(&answer)) {
+      (void)audit_.Add(
+          clock_.Now(), user, role, request, "not sent: " + request_id + ": " + fault->text);
+    }
+    return answer;
   }
 
   ApiAnswer StartReport(std::string_view json, const std::string& user, Role role) {
@@ -288,20 +296,24 @@ class BridgeProcess::Impl {
                       "cannot_send",
                       fmt::format("nobody hears commands: does {} run?", command.addressee.view())};
     }
+    {
+      const std::lock_guard lock(mutex_);
+      board_.Send(command, Moment());
+    }
     // Also what the bridge does itself: so it stands in the journal.
     const dds::WriteOutcome outcome = commands_.Write(command);
     if (!is_own && outcome != dds::WriteOutcome::kWritten) {
+      const std::lock_guard lock(mutex_);
+      board_.Withdraw(command);
       return ApiFault{503,
                       "cannot_send",
                       outcome == dds::WriteOutcome::kRefused
                           ? std::string(dds::FaultText(commands_.counters().refused_because))
                           : "there is no network"};
     }
-    {
+    if (is_own) {
       const std::lock_guard lock(mutex_);
-      const hmi::Moment now = Moment();
-      board_.Sent(command, now);
-      if (is_own && board_.Obey(command, now)) answers_.Keep(board_.own_alarms().answers());
+      if (board_.Obey(command, Moment())) answers_.Keep(board_.own_alarms().answers());
     }
     if (ConsoleServer* server = server_.load()) server->Notify();
     return Json({{"request_id", request_id}}).dump();

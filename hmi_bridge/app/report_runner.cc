@@ -71,14 +71,8 @@ std::string WhyEnded(int status) {
 
 }  // namespace
 
-ReportRunner::ReportRunner(ReportPlaces places,
-                           std::string folder,
-                           const Clock& clock,
-                           std::function<void()> on_change)
-    : places_(std::move(places)),
-      folder_(std::move(folder)),
-      clock_(clock),
-      on_change_(std::move(on_change)) {
+ReportRunner::ReportRunner(ReportPlaces places, std::string folder, const Clock& clock)
+    : places_(std::move(places)), folder_(std::move(folder)), clock_(clock) {
   std::error_code ignored;
   std::filesystem::remove_all(folder_, ignored);
   thread_ = std::thread([this] { Work(); });
@@ -128,19 +122,15 @@ ApiAnswer ReportRunner::Start(std::string_view json, const std::string& user) {
     ++version_;
   }
   work_.notify_all();
-  on_change_();
   return Json({{"report_id", std::to_string(number)}}).dump();
 }
 
 void ReportRunner::Change(std::uint64_t number, const std::function<void(Report&)>& change) {
-  {
-    const std::lock_guard lock(mutex_);
-    for (Report& report : reports_) {
-      if (report.number == number) change(report);
-    }
-    ++version_;
+  const std::lock_guard lock(mutex_);
+  for (Report& report : reports_) {
+    if (report.number == number) change(report);
   }
-  on_change_();
+  ++version_;
 }
 
 void ReportRunner::Work() {

@@ -26,11 +26,8 @@ class ReportRunner {
   static constexpr std::size_t kMostWaiting = 4;
   static constexpr std::size_t kMostKept = 20;
 
-  // `folder` is emptied: reports are of one run of the bridge. `on_change` comes from its thread.
-  ReportRunner(ReportPlaces places,
-               std::string folder,
-               const Clock& clock,
-               std::function<void()> on_change);
+  // `folder` is emptied: reports are of one run of the bridge.
+  ReportRunner(ReportPlaces places, std::string folder, const Clock& clock);
   ~ReportRunner();
   ReportRunner(const ReportRunner&) = delete;
   ReportRunner& operator=(const ReportRunner&) = delete;
@@ -65,7 +62,6 @@ class ReportRunner {
   const ReportPlaces places_;
   const std::string folder_;
   const Clock& clock_;
-  const std::function<void()> on_change_;
 
   std::mutex mutex_;  // guards all below
   std::condition_variable work_;

@@ -100,6 +100,11 @@ void CommandLog::Add(const dds::Command& command, std::int64_t now_steady_ms) {
   entries_.push_back({.command = command, .sent_steady_ms = now_steady_ms});
 }
 
+void CommandLog::Withdraw(std::string_view request_id) {
+  std::erase_if(entries_,
+                [&](const Entry& entry) { return entry.command.request_id.view() == request_id; });
+}
+
 bool CommandLog::Add(const dds::CommandReply& reply) {
   for (Entry& entry : entries_) {
     if (!(entry.command.request_id == reply.request_id) ||

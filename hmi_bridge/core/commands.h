@@ -31,6 +31,8 @@ class CommandLog {
   static constexpr std::int64_t kAnswerWithin_ms = 8000;
 
   void Add(const dds::Command& command, std::int64_t now_steady_ms);
+  // One that could not be sent after all.
+  void Withdraw(std::string_view request_id);
   // False for the answer to somebody else's command.
   bool Add(const dds::CommandReply& reply);
   // True when a command has become "unanswered".

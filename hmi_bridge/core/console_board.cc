@@ -17,6 +17,7 @@ constexpr std::int64_t kStart_ms = 10'000;
 constexpr std::int64_t kClockDoubt_ms = 2000;
 
 constexpr std::size_t kMostEvents = 60;
+constexpr std::size_t kMostTargets = 64;
 constexpr std::size_t kMostAxisPoints = 4000;
 constexpr double kAxisStep_m = 5.0;
 
@@ -164,8 +165,9 @@ std::optional<ConsoleAlarm> AlarmOf(dds::AlarmKind kind) {
       return ConsoleAlarm::kIncompatibleQos;
     case dds::AlarmKind::kRejected:
       return ConsoleAlarm::kSampleRejected;
-    case dds::AlarmKind::kNoNetwork:
     case dds::AlarmKind::kStartFailed:
+      return ConsoleAlarm::kDdsStartFailed;
+    case dds::AlarmKind::kNoNetwork:
     case dds::AlarmKind::kSilent:
       return {};
   }
@@ -245,7 +247,8 @@ void ConsoleBoard::Touch(Part part) {
 void ConsoleBoard::Add(const dds::Guidance& message, const Arrival& arrival, const Moment& now) {
   if (!IsOurs(message)) return;
   guidance_ = {message, arrival};
-  history_.Add(message);
+  // Which of two senders is right is not known: neither is remembered as what was.
+  if (!arrival.contested) history_.Add(message);
   own_alarms_.Set(ConsoleAlarm::kOtherMachineFile,
                   message.machine_sha256.view() != machine_.machine_sha256 ||
                       message.axis_sha256.view() != machine_.axis_sha256);
@@ -290,6 +293,12 @@ void ConsoleBoard::Add(const dds::StationSetUp& message, const Arrival& arrival,
 void ConsoleBoard::Add(const dds::StationObservation& message, const Arrival&, const Moment&) {
   if (!IsOurs(message)) return;
   observations_.insert_or_assign(std::string(message.target.view()), message);
+  if (observations_.size() > kMostTargets) {
+    observations_.erase(std::min_element(
+        observations_.begin(), observations_.end(), [](const auto& one, const auto& other) {
+          return one.second.sensed_at < other.second.sensed_at;
+        }));
+  }
   Touch(kStation);
 }
 
@@ -329,7 +338,7 @@ void ConsoleBoard::Add(const dds::CommandReply& message, const Arrival&, const M
 
 void ConsoleBoard::Add(const dds::Alarm& alarm, const Moment& now) {
   const auto own = AlarmOf(alarm.kind);
-  if (!own) return;
+  if (!own || !alarm.ChangesKind()) return;
   own_alarms_.Set(*own, alarm.active, alarm.text);
   if (own_alarms_.Tick(now.utc)) Touch(kAlarms);
 }
@@ -386,8 +395,13 @@ void ConsoleBoard::Tick(const Moment& now) {
   if (commands_.Tick(now.steady_ms)) Touch(kCommands);
 }
 
-void ConsoleBoard::Sent(const dds::Command& command, const Moment& now) {
+void ConsoleBoard::Send(const dds::Command& command, const Moment& now) {
   commands_.Add(command, now.steady_ms);
+  Touch(kCommands);
+}
+
+void ConsoleBoard::Withdraw(const dds::Command& command) {
+  commands_.Withdraw(command.request_id.view());
   Touch(kCommands);
 }
 

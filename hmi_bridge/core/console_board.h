@@ -75,8 +75,10 @@ class ConsoleBoard {
   // What time alone changes: silence, shelves, unanswered commands. A few times a second.
   void Tick(const Moment& now);
 
-  // A command that was sent.
-  void Sent(const dds::Command& command, const Moment& now);
+  // A command that is about to be sent: its answer may come before the sender knows that it is out.
+  void Send(const dds::Command& command, const Moment& now);
+  // It could not be sent.
+  void Withdraw(const dds::Command& command);
   // One that is for the bridge itself.
   Result<std::string, std::string> Obey(const dds::Command& command, const Moment& now);
 

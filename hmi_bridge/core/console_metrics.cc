@@ -75,7 +75,7 @@ std::string ConsoleBoard::Metrics(const Moment& now) const {
                 "of a point against the design axis; absent: not known");
   text.Describe("tbm_deviation_sigma_millimetres", "gauge", "one standard deviation of it");
   text.Describe("tbm_chainage_metres", "gauge", "internal chainage of a point; absent: not known");
-  text.Describe("tbm_guidance_validity", "gauge", "0 invalid, 1 degraded, 2 valid");
+  text.Describe("tbm_guidance_validity", "gauge", "0 invalid or two senders, 1 degraded, 2 valid");
   text.Describe("tbm_age_seconds", "gauge", "worse of stamp and arrival; absent: never heard");
   if (guidance_) {
     const dds::Guidance& guidance = guidance_->message;
@@ -83,10 +83,14 @@ std::string ConsoleBoard::Metrics(const Moment& now) const {
     text.Value("tbm_age_seconds",
                Labels("topic", "guidance", machine),
                1e-3 * static_cast<double>(age_ms));
-    text.Value("tbm_guidance_validity", machine, static_cast<double>(guidance.validity));
-    // A stale deviation is none.
+    // A stale deviation is none, and of two senders neither is to be trusted.
+    const bool is_contested = guidance_->arrival.contested;
+    const bool is_told = age_ms <= kGuidanceStale_ms && !is_contested;
+    text.Value("tbm_guidance_validity",
+               machine,
+               is_contested ? 0.0 : static_cast<double>(guidance.validity));
     for (const dds::GuidedPoint& point : guidance.points) {
-      if (age_ms > kGuidanceStale_ms) break;
+      if (!is_told) break;
       const std::string labels = Labels("point", point.name.view(), machine);
       text.Value("tbm_deviation_millimetres",
                  Labels("direction", "right", labels),

@@ -1,9 +1,12 @@
 #include "hmi_bridge/core/own_alarms.h"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <span>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "guidance/core/alarm_command.h"
 
@@ -91,6 +94,18 @@ constexpr std::array<ConsoleRule, kConsoleAlarmCount> kRules{{
      0s,
      "A calibration is due:",
      "Call the surveyor; the new day goes into hmi_bridge.yaml."},
+    {ConsoleAlarm::kDdsStartFailed,
+     "dds_start_failed",
+     AlarmPriority::kHigh,
+     0s,
+     "The console cannot take part in the network's traffic; it tries again.",
+     "Tell the integrator."},
+    {ConsoleAlarm::kTooManyEvents,
+     "too_many_events",
+     AlarmPriority::kMedium,
+     0s,
+     "More events stand than the console keeps; the first of the others:",
+     "Answer those that are over; see the journal for the others."},
 }};
 
 std::string KeyOf(std::string_view source, std::string_view code) {
@@ -102,6 +117,20 @@ std::string KeyOf(std::string_view source, std::string_view code) {
 
 AlarmPriority UrgencyOf(dds::Severity severity) {
   return severity == dds::Severity::kAlarm ? AlarmPriority::kMedium : AlarmPriority::kLow;
+}
+
+bool IsQuietEvent(const std::pair<const std::string, std::unique_ptr<OwnAlarms::Entry>>& place) {
+  const OwnAlarms::Entry& entry = *place.second;
+  return entry.is_event && entry.alarm().state == AlarmState::kNormal &&
+         !entry.alarm().shelved_until;
+}
+
+// Text of others stays within its quotes and its line.
+std::string OfOneLine(std::string text) {
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f || c == '"') c = '?';
+  }
+  return text;
 }
 
 AlarmBoard BoardOf(const AlarmRule& rule) { return AlarmBoard(std::span(&rule, 1)); }
@@ -138,33 +167,34 @@ OwnAlarms::Entry& OwnAlarms::NewEntry(std::string source, std::string code, Alar
   return *entries_.emplace(key, std::move(entry)).first->second;
 }
 
-bool OwnAlarms::MakeRoom() {
-  if (entries_.size() < kMostEvents + kConsoleAlarmCount) return true;
-  for (auto entry = entries_.begin(); entry != entries_.end(); ++entry) {
-    const bool is_quiet = entry->second->is_event &&
-                          entry->second->alarm().state == AlarmState::kNormal &&
-                          !entry->second->alarm().shelved_until;
-    if (!is_quiet) continue;
-    entries_.erase(entry);
-    return true;
-  }
-  return false;
+bool OwnAlarms::HasRoom() const {
+  return entries_.size() < kMostEvents + kConsoleAlarmCount ||
+         std::any_of(entries_.begin(), entries_.end(), IsQuietEvent);
 }
 
-bool OwnAlarms::Add(const dds::Event& event, Timestamp now) {
+void OwnAlarms::MakeRoom() {
+  if (entries_.size() < kMostEvents + kConsoleAlarmCount) return;
+  entries_.erase(std::find_if(entries_.begin(), entries_.end(), IsQuietEvent));
+}
+
+void OwnAlarms::Add(const dds::Event& event, Timestamp now) {
   const std::string key = KeyOf(event.source.view(), event.code.view());
   auto found = entries_.find(key);
   const bool raises = event.active && event.severity != dds::Severity::kInfo;
   if (found == entries_.end()) {
-    if (!raises) return true;
-    if (!MakeRoom()) return false;
+    if (!raises) return;
+    if (!HasRoom()) {
+      Set(ConsoleAlarm::kTooManyEvents, true, key);
+      return;
+    }
+    MakeRoom();
     NewEntry(std::string(event.source.view()),
              std::string(event.code.view()),
              UrgencyOf(event.severity));
     found = entries_.find(key);
   }
   Entry& entry = *found->second;
-  if (!entry.is_event) return true;
+  if (!entry.is_event) return;
   if (event.active) entry.cause = std::string(event.text.view());
   entry.event_at = event.at;
   entry.value = event.active ? 1.0 : 0.0;
@@ -175,7 +205,6 @@ bool OwnAlarms::Add(const dds::Event& event, Timestamp now) {
     entry.board.Acknowledge(0, now);
     entry.acknowledged_by = answer->second.by;
   }
-  return true;
 }
 
 void OwnAlarms::Forget(std::string_view source, std::string_view code) {
@@ -196,6 +225,7 @@ void OwnAlarms::Set(ConsoleAlarm alarm, std::optional<bool> holds, std::string_v
 
 bool OwnAlarms::Tick(Timestamp now) {
   bool changed = false;
+  if (HasRoom()) Set(ConsoleAlarm::kTooManyEvents, false);
   for (auto& [key, entry] : entries_) {
     const AlarmState before = entry->alarm().state;
     const auto shelf_before = entry->alarm().shelved_until;
@@ -213,6 +243,22 @@ bool OwnAlarms::Tick(Timestamp now) {
     }
   }
   return changed;
+}
+
+std::vector<std::string> OwnAlarms::TakeNews() {
+  std::vector<std::string> lines;
+  for (auto& [key, entry] : entries_) {
+    const AlarmState state = entry->alarm().state;
+    if (state == entry->logged_state) continue;
+    entry->logged_state = state;
+    lines.push_back(
+        fmt::format("source=hmi_bridge code=alarm alarm={} state={} by=\"{}\" text=\"{}\"",
+                    OfOneLine(key),
+                    StateCode(state),
+                    OfOneLine(entry->acknowledged_by),
+                    OfOneLine(entry->cause)));
+  }
+  return lines;
 }
 
 Result<std::string, std::string> OwnAlarms::Obey(std::string_view verb,

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "guidance/core/alarm_board.h"
 #include "idl/cpp/messages.h"
@@ -26,8 +27,10 @@ enum class ConsoleAlarm {
   kIncompatibleQos,
   kSampleRejected,
   kCalibrationDue,
+  kDdsStartFailed,
+  kTooManyEvents,
 };
-inline constexpr int kConsoleAlarmCount = 11;
+inline constexpr int kConsoleAlarmCount = 13;
 
 // "guidance_silent".
 std::string_view CodeOf(ConsoleAlarm alarm);
@@ -47,7 +50,8 @@ struct Answer {
 // answered it and its process says that it is over.
 class OwnAlarms {
  public:
-  // Events of so many keys; of more the quiet ones make room, and when none is quiet, nothing does.
+  // Events of so many keys; of more the quiet ones make room, and when none is quiet, it is
+  // kTooManyEvents that stands for the rest.
   static constexpr std::size_t kMostEvents = 200;
 
   struct Entry {
@@ -64,14 +68,14 @@ class OwnAlarms {
     AlarmBoard board;  // of this one alarm
     // Whether it holds now, for a board that is told the same again with each tick.
     std::optional<double> value{};
+    AlarmState logged_state = AlarmState::kNormal;
 
     const Alarm& alarm() const { return board.alarm(0); }
   };
 
   OwnAlarms();
 
-  // False when there is no room.
-  bool Add(const dds::Event& event, Timestamp now);
+  void Add(const dds::Event& event, Timestamp now);
   // Of an event whose alarm its process keeps itself.
   void Forget(std::string_view source, std::string_view code);
   // Whether it holds; empty: not known. `detail` is added to its cause.
@@ -89,13 +93,17 @@ class OwnAlarms {
 
   const std::map<std::string, std::unique_ptr<Entry>>& entries() const { return entries_; }
 
+  // What has changed its state since it was asked last, a line each, for the log.
+  std::vector<std::string> TakeNews();
+
   // What was answered, for the disk, and back from it before anything else.
   const std::map<std::string, Answer>& answers() const { return answers_; }
   void Restore(std::map<std::string, Answer> answers) { answers_ = std::move(answers); }
 
  private:
   Entry& NewEntry(std::string source, std::string code, AlarmPriority urgency);
-  bool MakeRoom();
+  bool HasRoom() const;
+  void MakeRoom();
 
   std::map<std::string, std::unique_ptr<Entry>> entries_;  // by key; addresses stand
   std::map<std::string, Answer> answers_;

@@ -48,7 +48,7 @@ std::string_view Word(ServerEvent::What what) {
   return "unknown";
 }
 
-std::vector<std::string> Problems(const ServerOptions& options) {
+std::vector<std::string> Problems(const ServerOptions& options, bool tls_follows) {
   std::vector<std::string> problems;
   if (options.listen.empty()) problems.emplace_back("there is no address to listen on");
   for (const ListenAddress& listen : options.listen) {
@@ -57,7 +57,7 @@ std::vector<std::string> Problems(const ServerOptions& options) {
       problems.push_back(fmt::format(
           "listen address '{}' is no IPv4 or IPv6 address, such as 127.0.0.1", listen.address));
     }
-    if (reach == Reach::kNetwork && !options.tls) {
+    if (reach == Reach::kNetwork && !options.tls && !tls_follows) {
       problems.push_back(fmt::format(
           "listen address {} is reached from the network: passwords would cross it readable by "
           "everybody; give a certificate and key, or listen on 127.0.0.1",

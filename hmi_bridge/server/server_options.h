@@ -78,7 +78,8 @@ struct ServerOptions {
   std::function<void(const ServerEvent&)> on_event;  // from any thread
 };
 
-// All that is wrong with it, a sentence each. Opens no port.
-std::vector<std::string> Problems(const ServerOptions& options);
+// All that is wrong with it, a sentence each. Opens no port. `tls_follows`: a certificate is still
+// to be made.
+std::vector<std::string> Problems(const ServerOptions& options, bool tls_follows = false);
 
 }  // namespace tbm::hmi

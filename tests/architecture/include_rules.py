@@ -35,7 +35,7 @@ ALLOWED = {
     "devices/app": {"Eigen", *POSE_ALL, "devices", "guidance/axis", "guidance/config", "guidance/core/machine.h",
                     "guidance/core/alarm_board.h", "guidance/core/alarm_command.h", "guidance/station", "idl/cpp",
                     "pose/app/service_manager.h", "fmt", "CLI", "yaml-cpp", *POSIX, "arv.h"},
-    "guidance/app": {"Eigen", *POSE_ALL, "pose/app/service_manager.h", "devices", "guidance/axis", "guidance/config", "guidance/core",
+    "guidance/app": {"Eigen", *POSE_ALL, "devices", "guidance/axis", "guidance/config", "guidance/core",
                      "guidance/journal", "idl/cpp", "fmt", "CLI", "nlohmann", *POSIX},
     "guidance/station": {"Eigen", "pose/base", "pose/geometry", "pose/solve/tails.h"},
     "guidance/shield": {"Eigen", *POSE, "pose/solve",
@@ -47,7 +47,7 @@ ALLOWED = {
     "hmi_bridge/core": {"Eigen", *POSE, "guidance/axis", "guidance/core", "guidance/shield", "idl/cpp/messages.h", "idl/cpp/guidance_messages.h",
                         "idl/cpp/alarm.h", "idl/cpp/bounded_text.h", "idl/cpp/words.h", "hmi_bridge/server/console_source.h", "nlohmann", "fmt"},
     "hmi_bridge/server": {"pose/base", "boost", "openssl", "nlohmann", "fmt", "zlib.h", *POSIX},
-    "hmi_bridge/app": {"Eigen", *POSE_ALL, "pose/app/service_manager.h", "devices/app/end_signals.h", "guidance/axis", "guidance/config", "guidance/core",
+    "hmi_bridge/app": {"Eigen", *POSE_ALL, "devices/app/end_signals.h", "devices/app/service_run.h", "guidance/axis", "guidance/config", "guidance/core",
                        "guidance/app/exit_code.h", "idl/cpp", "hmi_bridge", "nlohmann", "fmt", "CLI", "yaml-cpp", *POSIX},
     "idl/cpp": {"Eigen", *POSE_ALL, "fastdds", "fastrtps", "fastcdr", "tbm_idl", "fmt", *POSIX},
 }

@@ -62,7 +62,7 @@ describe('freshness', () => {
     }
   });
   it('trusts neither of two senders', () => {
-    expect(Judge(part({timing: timing({contested: true})}), receipt, at(0))).toMatchObject({quality: 'degraded', reason: 'contested'});
+    expect(Judge(part({timing: timing({contested: true})}), receipt, at(0))).toMatchObject({quality: 'missing', reason: 'contested'});
   });
   it('lets staleness win over degraded, and an invalid sender that fell silent say so', () => {
     expect(Judge(part({validity: 'degraded', reason: 'few_leds'}), receipt, at(5000)).quality).toBe('stale');

@@ -238,6 +238,36 @@ TEST_F(BridgeProcessOnDds, ACommandThatNobodyHearsIsToldAtOnce) {
   EXPECT_THAT(
       FaultOf(process_->Ask({"guidance", "acknowledge", "roll_high", ""}, "ann", Role::kOperator)),
       HasSubstr("503"));
+  EXPECT_THAT(Audit(), HasSubstr("\"outcome\":\"sent as "));
+  EXPECT_THAT(Audit(), HasSubstr("\"outcome\":\"not sent: "));
+  EXPECT_TRUE(Part("commands").empty());
+}
+
+TEST_F(BridgeProcessOnDds, AnAnswerThatComesAtOnceIsNotLost) {
+  dds::Publisher<dds::CommandReply> replies(others_);
+  const dds::Subscriber<dds::Command> commands(
+      others_, [&](const dds::Command& command, const dds::SampleFacts&) {
+        dds::CommandReply reply;
+        reply.machine_id = command.machine_id;
+        reply.request_id = command.request_id;
+        reply.source = command.addressee;
+        reply.outcome = dds::CommandOutcome::kDone;
+        reply.text = "done";
+        reply.published_at = clock_.Now();
+        replies.Write(reply);
+      });
+  ASSERT_TRUE(
+      Eventually([&] { return commands.matched_writers() > 0 && replies.matched_readers() > 0; }));
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_EQ(FaultOf(process_->Ask(
+                  {"guidance", "acknowledge", "roll_high", ""}, "ann", Role::kOperator)),
+              "");
+  }
+  EXPECT_TRUE(Eventually([&] {
+    const Json asked = Part("commands");
+    return std::all_of(
+        asked.begin(), asked.end(), [](const Json& one) { return one["state"] == "done"; });
+  }));
 }
 
 }  // namespace

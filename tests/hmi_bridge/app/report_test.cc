@@ -165,7 +165,7 @@ class Reports : public testing::Test {
     test::WriteText(program, "#!/bin/sh\n" + script);
     chmod(program.c_str(), 0700);
     runner_ = std::make_unique<ReportRunner>(
-        ReportPlaces{program, "/axis.xml", {}, "/j"}, folder_ / "reports", clock_, [] {});
+        ReportPlaces{program, "/axis.xml", {}, "/j"}, folder_ / "reports", clock_);
     return *runner_;
   }
   Json View() { return Json::parse(*runner_->View().json); }

@@ -1,7 +1,4 @@
-#include "hmi_bridge/core/console_board.h"
-
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <numbers>
 #include <sstream>
@@ -11,10 +8,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "guidance/config/guidance_file.h"
+#include "tests/hmi_bridge/core/console_fixture.h"
 #include "tests/idl/guidance_samples.h"
 #include "tests/idl/samples.h"
-#include "tests/support/temp_folder.h"
 
 namespace tbm::hmi {
 namespace {
@@ -25,118 +21,6 @@ using ::testing::IsEmpty;
 using ::testing::Not;
 
 constexpr double kNaN = dds::kNaN;
-constexpr std::int64_t kMs = 1'000'000;
-
-const GuidedMachine& Example() {
-  static const GuidedMachine machine = [] {
-    const test::TempFolder folder;
-    for (const char* file : {"guidance/app/example/machine.yaml",
-                             "guidance/app/example/axis.xml",
-                             "pose/app/example/rig.yaml"}) {
-      const std::filesystem::path from = std::string(TBM_SOURCE_DIR "/") + file;
-      std::filesystem::copy_file(from, folder / from.filename().string());
-    }
-    MachineFaults warnings;
-    auto loaded = LoadGuidedMachine(folder / "machine.yaml", &warnings);
-    return std::move(loaded).value();
-  }();
-  return machine;
-}
-
-// A board of the example's machine, and its clock.
-struct Console {
-  Moment now{{1'800'000'000'000 * kMs}, 5'000'000};
-  ConsoleBoard board{ConsoleMachineOf(Example().machine,
-                                      Example().rig,
-                                      Example().axis,
-                                      Example().machine_sha256,
-                                      {{"camera", {0}, {1'800'000'100'000 * kMs}}}),
-                     {"1.2.3", "build-7", 25, now.utc},
-                     now};
-
-  void Wait(std::int64_t ms) {
-    now.utc = now.utc + std::chrono::milliseconds(ms);
-    now.steady_ms += ms;
-    board.Tick(now);
-  }
-  template <class Message>
-  void Hear(Message message) {
-    message.machine_id = "TBM-1";
-    board.Add(message, {now.steady_ms, false}, now);
-  }
-  Json Part(std::string_view name) {
-    for (const Section& section : board.Sections()) {
-      if (section.name == name) return Json::parse(*section.json);
-    }
-    ADD_FAILURE() << "no section " << name;
-    return nullptr;
-  }
-  std::vector<std::string> Alarms() {
-    std::vector<std::string> keys;
-    const Json alarms = Part("alarms");
-    for (const Json& alarm : alarms["list"]) {
-      keys.push_back(alarm["source"].get<std::string>() + "/" + alarm["code"].get<std::string>() +
-                     " " + alarm["phase"].get<std::string>());
-    }
-    return keys;
-  }
-  Json AlarmOf(const std::string& code) {
-    const Json alarms = Part("alarms");
-    for (const Json& alarm : alarms["list"]) {
-      if (alarm["code"] == code) return alarm;
-    }
-    return nullptr;
-  }
-  Result<std::string, std::string> Ask(const char* verb,
-                                       const char* argument,
-                                       const char* because = "") {
-    dds::Command command;
-    command.addressee = kOwnAddressee;
-    command.verb = verb;
-    command.argument = argument;
-    command.by = "ann";
-    command.because = because;
-    return board.Obey(command, now);
-  }
-};
-
-dds::Guidance GuidanceAt(Timestamp valid_at, double chainage_m = 100.0) {
-  dds::Guidance guidance;
-  guidance.valid_at = valid_at;
-  guidance.validity = dds::Validity::kValid;
-  guidance.steer_by = "cutter_face";
-  guidance.machine_sha256 = std::string_view(Example().machine_sha256);
-  guidance.axis_sha256 = std::string_view(Example().axis.file_sha256());
-  dds::GuidedPoint point;
-  point.name = "cutter_face";
-  point.shield = "front";
-  point.validity = dds::Validity::kValid;
-  point.deviation_right_m = 0.0123456;
-  point.deviation_up_m = -0.00000001;
-  point.chainage_m = chainage_m;
-  guidance.points.push_back(point);
-  return guidance;
-}
-
-dds::AlarmStatus AlarmNow(const char* code, dds::AlarmPhase phase, dds::AlarmUrgency urgency) {
-  dds::AlarmStatus alarm;
-  alarm.source = "guidance";
-  alarm.code = code;
-  alarm.phase = phase;
-  alarm.urgency = urgency;
-  return alarm;
-}
-
-dds::Event EventNow(const char* code, bool active, Timestamp at) {
-  dds::Event event;
-  event.source = "camera_box";
-  event.code = code;
-  event.severity = dds::Severity::kAlarm;
-  event.active = active;
-  event.at = at;
-  event.text = "the lens is covered";
-  return event;
-}
 
 TEST(ViewJson, MetresBecomeMillimetresAndRadiansDegrees) {
   dds::Guidance guidance = dds::test::FullGuidance();
@@ -276,195 +160,6 @@ TEST(ConsoleBoard, TheMachineSectionHasTheDesignAhead) {
   EXPECT_EQ(axis.back()["chainage_m"], machine["axis_end_m"]);
 }
 
-TEST(ConsoleAlarms, SilenceOfTheGuidanceIsAnAlarmWithinTwoSeconds) {
-  Console console;
-  console.Hear(GuidanceAt(console.now.utc));
-  console.Wait(700);
-  EXPECT_THAT(console.Alarms(), IsEmpty());
-  for (int i = 0; i < 6; ++i) console.Wait(200);
-  EXPECT_THAT(console.Alarms(), ElementsAre("hmi_bridge/guidance_silent unacknowledged"));
-  console.Hear(GuidanceAt(console.now.utc));
-  console.Wait(10);
-  EXPECT_THAT(console.Alarms(), ElementsAre("hmi_bridge/guidance_silent returned_unacknowledged"));
-  EXPECT_TRUE(console.Ask("acknowledge", "hmi_bridge/guidance_silent"));
-  EXPECT_THAT(console.Alarms(), IsEmpty());
-}
-
-TEST(ConsoleAlarms, NeverHeardIsMissedAfterTheStart) {
-  Console console;
-  for (int i = 0; i < 9; ++i) console.Wait(1000);
-  EXPECT_THAT(console.Alarms(), IsEmpty());
-  for (int i = 0; i < 5; ++i) console.Wait(1000);
-  EXPECT_THAT(console.Alarms(),
-              ElementsAre("hmi_bridge/guidance_silent unacknowledged",
-                          "hmi_bridge/camera_box_silent unacknowledged",
-                          "hmi_bridge/total_station_silent unacknowledged"));
-}
-
-TEST(ConsoleAlarms, AProcessThatFallsSilentClearsNothing) {
-  Console console;
-  console.Hear(
-      AlarmNow("deviation_high", dds::AlarmPhase::kUnacknowledged, dds::AlarmUrgency::kHigh));
-  const std::int64_t heard_utc_ms = Milliseconds(console.now.utc);
-  EXPECT_TRUE(console.AlarmOf("deviation_high")["silent_since_utc_ms"].is_null());
-  console.Wait(3500);
-  EXPECT_EQ(console.AlarmOf("deviation_high")["silent_since_utc_ms"], heard_utc_ms);
-  EXPECT_EQ(console.AlarmOf("deviation_high")["phase"], "unacknowledged");
-}
-
-TEST(ConsoleAlarms, UrgentFirstAndOfThoseTheFirstRaised) {
-  Console console;
-  auto low = AlarmNow("tilt_late", dds::AlarmPhase::kUnacknowledged, dds::AlarmUrgency::kLow);
-  low.raised_at = {10 * kMs};
-  auto late = AlarmNow("position_lost", dds::AlarmPhase::kAcknowledged, dds::AlarmUrgency::kHigh);
-  late.raised_at = {30 * kMs};
-  auto early =
-      AlarmNow("deviation_high", dds::AlarmPhase::kUnacknowledged, dds::AlarmUrgency::kHigh);
-  early.raised_at = {20 * kMs};
-  auto normal = AlarmNow("roll_high", dds::AlarmPhase::kNormal, dds::AlarmUrgency::kHigh);
-  for (const auto& alarm : {low, late, early, normal}) console.Hear(alarm);
-  EXPECT_THAT(console.Alarms(),
-              ElementsAre("guidance/deviation_high unacknowledged",
-                          "guidance/position_lost acknowledged",
-                          "guidance/tilt_late unacknowledged"));
-  EXPECT_EQ(console.Part("alarms")["first_out"], "guidance/tilt_late");
-}
-
-TEST(ConsoleAlarms, AShelvedOneIsListedAlsoWhenItIsNormal) {
-  Console console;
-  auto shelved = AlarmNow("roll_high", dds::AlarmPhase::kNormal, dds::AlarmUrgency::kMedium);
-  shelved.shelved_until = console.now.utc + std::chrono::minutes(5);
-  shelved.shelved_by = "bob";
-  console.Hear(shelved);
-  EXPECT_EQ(console.AlarmOf("roll_high")["shelved_by"], "bob");
-  EXPECT_TRUE(console.Part("alarms")["first_out"].is_null());
-}
-
-TEST(ConsoleAlarms, AnEventThatStandsIsAnAlarmUntilItIsOverAndAnswered) {
-  Console console;
-  console.Hear(EventNow("camera_silent", true, console.now.utc - std::chrono::seconds(60)));
-  EXPECT_THAT(console.Alarms(), ElementsAre("camera_box/camera_silent unacknowledged"));
-  EXPECT_EQ(console.AlarmOf("camera_silent")["origin"], "event");
-  EXPECT_EQ(console.AlarmOf("camera_silent")["raised_at_utc_ms"],
-            Milliseconds(console.now.utc) - 60'000);
-  console.Hear(EventNow("camera_silent", false, console.now.utc));
-  EXPECT_THAT(console.Alarms(), ElementsAre("camera_box/camera_silent returned_unacknowledged"));
-  EXPECT_TRUE(console.Ask("acknowledge", "camera_box/camera_silent"));
-  EXPECT_THAT(console.Alarms(), IsEmpty());
-}
-
-TEST(ConsoleAlarms, InformationIsNoAlarm) {
-  Console console;
-  dds::Event event = EventNow("started", true, console.now.utc);
-  event.severity = dds::Severity::kInfo;
-  console.Hear(event);
-  EXPECT_THAT(console.Alarms(), IsEmpty());
-  EXPECT_EQ(console.Part("events").size(), 1u);
-}
-
-TEST(ConsoleAlarms, WhatItsProcessKeepsIsListedOnce) {
-  Console console;
-  dds::Event event = EventNow("deviation_high", true, console.now.utc);
-  event.source = "guidance";
-  console.Hear(event);
-  const auto status =
-      AlarmNow("deviation_high", dds::AlarmPhase::kAcknowledged, dds::AlarmUrgency::kHigh);
-  console.Hear(status);
-  EXPECT_THAT(console.Alarms(), ElementsAre("guidance/deviation_high acknowledged"));
-  console.Hear(event);
-  EXPECT_THAT(console.Alarms(), ElementsAre("guidance/deviation_high acknowledged"));
-}
-
-TEST(ConsoleAlarms, AnAnswerOutlivesTheBridgeButNotANewEvent) {
-  Console before;
-  const Timestamp at = before.now.utc;
-  before.Hear(EventNow("camera_silent", true, at));
-  ASSERT_TRUE(before.Ask("acknowledge", "camera_box/camera_silent"));
-  Console after;
-  after.board.own_alarms().Restore(before.board.own_alarms().answers());
-  after.Hear(EventNow("camera_silent", true, at));
-  EXPECT_THAT(after.Alarms(), ElementsAre("camera_box/camera_silent acknowledged"));
-  EXPECT_EQ(after.AlarmOf("camera_silent")["acknowledged_by"], "ann");
-  after.Hear(EventNow("camera_silent", false, at + std::chrono::seconds(5)));
-  after.Hear(EventNow("camera_silent", true, at + std::chrono::seconds(9)));
-  EXPECT_THAT(after.Alarms(), ElementsAre("camera_box/camera_silent unacknowledged"));
-  EXPECT_EQ(after.AlarmOf("camera_silent")["acknowledged_by"], "");
-}
-
-TEST(ConsoleAlarms, AreShelvedForATimeWithNameAndReason) {
-  Console console;
-  console.Hear(EventNow("camera_silent", true, console.now.utc));
-  EXPECT_FALSE(console.Ask("shelve", "camera_box/camera_silent 15"));
-  EXPECT_FALSE(console.Ask("shelve", "camera_box/camera_silent 0", "cleaning"));
-  EXPECT_FALSE(console.Ask("shelve", "camera_box/nothing 15", "cleaning"));
-  ASSERT_TRUE(console.Ask("shelve", "camera_box/camera_silent 15", "cleaning"));
-  const Json shelved = console.AlarmOf("camera_silent");
-  EXPECT_EQ(shelved["shelved_until_utc_ms"], Milliseconds(console.now.utc) + 15 * 60'000);
-  EXPECT_EQ(shelved["shelved_by"], "ann");
-  EXPECT_EQ(shelved["shelved_because"], "cleaning");
-  console.Wait(15 * 60'000);
-  EXPECT_TRUE(console.AlarmOf("camera_silent")["shelved_until_utc_ms"].is_null());
-  EXPECT_EQ(console.AlarmOf("camera_silent")["shelved_by"], "");
-}
-
-TEST(ConsoleAlarms, ManyEventsTakeNoMoreThanTheirRoom) {
-  Console console;
-  for (int i = 0; i < 1000; ++i) {
-    const std::string code = "code_" + std::to_string(i);
-    console.Hear(EventNow(code.c_str(), true, console.now.utc));
-  }
-  EXPECT_EQ(console.board.own_alarms().entries().size(),
-            OwnAlarms::kMostEvents + kConsoleAlarmCount);
-  EXPECT_EQ(console.Part("events").size(), 60u);
-}
-
-TEST(ConsoleAlarms, AnotherMachineFileOrClockIsTold) {
-  Console console;
-  dds::Guidance other = GuidanceAt(console.now.utc - std::chrono::seconds(3600));
-  other.machine_sha256 = "another";
-  for (int i = 0; i < 60; ++i) {
-    other.valid_at = console.now.utc - std::chrono::seconds(3600);
-    console.Hear(other);
-    console.Wait(100);
-  }
-  EXPECT_THAT(console.Alarms(),
-              ElementsAre("hmi_bridge/other_machine_file unacknowledged",
-                          "hmi_bridge/clock_disagrees unacknowledged"));
-}
-
-TEST(ConsoleAlarms, ACalibrationThatIsDueIsTold) {
-  Console console;
-  console.Hear(GuidanceAt(console.now.utc));
-  console.Wait(99'000);
-  EXPECT_TRUE(console.AlarmOf("calibration_due").is_null());
-  console.Wait(1000);
-  EXPECT_THAT(console.AlarmOf("calibration_due")["cause"].get<std::string>(), HasSubstr("camera"));
-  EXPECT_EQ(console.Part("machine")["calibrations"][0]["due_at_utc_ms"], 1'800'000'100'000);
-}
-
-TEST(ConsoleAlarms, NoNetworkIsOne) {
-  Console console;
-  console.board.SetNetwork(false, console.now);
-  console.Wait(100);
-  console.Wait(1200);
-  EXPECT_THAT(console.Alarms(), ElementsAre("hmi_bridge/no_network unacknowledged"));
-  EXPECT_EQ(console.Part("bridge")["dds"]["running"], false);
-  console.board.SetNetwork(true, console.now);
-  console.Wait(100);
-  EXPECT_EQ(console.Part("bridge")["dds"]["running"], true);
-  EXPECT_THAT(console.Alarms(), ElementsAre("hmi_bridge/no_network returned_unacknowledged"));
-}
-
-TEST(ConsoleAlarms, TheDdsSideSpeaksToo) {
-  Console console;
-  console.board.Add(
-      dds::Alarm{dds::AlarmKind::kSecondWriter, true, "tbm/v1/guidance", "two of them"},
-      console.now);
-  EXPECT_THAT(console.AlarmOf("second_writer")["cause"].get<std::string>(),
-              HasSubstr("two of them"));
-  EXPECT_EQ(console.AlarmOf("second_writer")["urgency"], "high");
-}
-
 TEST(ConsoleBoard, EventsOfThePastStandInTheOrderOfTime) {
   Console console;
   console.Hear(EventNow("second", false, {2000 * kMs}));
@@ -524,7 +219,7 @@ TEST(Commands, AreFollowedUntilTheyAreAnswered) {
   dds::Command command = dds::test::FullCommand();
   command.addressee = "total_station";
   command.request_id = "request-1";
-  console.board.Sent(command, console.now);
+  console.board.Send(command, console.now);
   EXPECT_EQ(console.Part("commands")[0]["state"], "sent");
   dds::CommandReply reply;
   reply.request_id = "request-1";
@@ -546,11 +241,52 @@ TEST(Commands, AreFollowedUntilTheyAreAnswered) {
 
 TEST(Commands, OfWhichNothingIsHeardAreUnanswered) {
   Console console;
-  console.board.Sent(dds::test::FullCommand(), console.now);
+  console.board.Send(dds::test::FullCommand(), console.now);
   console.Wait(7000);
   EXPECT_EQ(console.Part("commands")[0]["state"], "sent");
   console.Wait(2000);
   EXPECT_EQ(console.Part("commands")[0]["state"], "unanswered");
+}
+
+TEST(Commands, OneThatCouldNotBeSentIsNotListed) {
+  Console console;
+  dds::Command first = dds::test::FullCommand();
+  first.request_id = "request-1";
+  dds::Command second = dds::test::FullCommand();
+  second.request_id = "request-2";
+  console.board.Send(first, console.now);
+  console.board.Send(second, console.now);
+  console.board.Withdraw(second);
+  ASSERT_EQ(console.Part("commands").size(), 1u);
+  EXPECT_EQ(console.Part("commands")[0]["request_id"], "request-1");
+}
+
+TEST(ConsoleBoard, TargetsTakeNoMoreThanTheirRoomAndTheOldestGoes) {
+  Console console;
+  for (int i = 0; i < 100; ++i) {
+    dds::StationObservation observation;
+    observation.target = std::string_view("prism_" + std::to_string(i));
+    observation.sensed_at = console.now.utc + std::chrono::seconds(i);
+    console.Hear(observation);
+  }
+  const Json observations = console.Part("station")["observations"];
+  EXPECT_EQ(observations.size(), 64u);
+  for (const Json& observation : observations) EXPECT_NE(observation["target"], "prism_35");
+}
+
+TEST(ConsoleBoard, OfTwoSendersNeitherIsRememberedOrExported) {
+  Console console;
+  dds::Guidance guidance = GuidanceAt(console.now.utc);
+  guidance.machine_id = "TBM-1";
+  console.board.Add(guidance, {console.now.steady_ms, true}, console.now);
+  const auto all = console.board.history().Between("cutter_face", 0, 1LL << 60, 1000);
+  ASSERT_TRUE(all);
+  EXPECT_TRUE((*all)["columns"]["at_utc_ms"].empty());
+  const std::string metrics = console.board.Metrics(console.now);
+  EXPECT_THAT(metrics, Not(HasSubstr("tbm_deviation_millimetres{")));
+  EXPECT_THAT(metrics, HasSubstr("tbm_guidance_validity{machine=\"TBM-1\"} 0\n"));
+  console.board.Add(guidance, {console.now.steady_ms, false}, console.now);
+  EXPECT_THAT(console.board.Metrics(console.now), HasSubstr("tbm_deviation_millimetres{"));
 }
 
 TEST(History, KeepsOneRowASecond) {

@@ -61,8 +61,9 @@ export function Judge(facts: Facts | null, receipt: Receipt | null, now: ReaderC
   if (facts.validity === 'invalid') {
     return {quality: 'missing', reason: facts.reason || 'no_value', age_ms, since_utc_ms, is_silent};
   }
+  // Which of two senders is right nobody knows: a number of either would be a guess.
+  if (timing.contested) return {quality: 'missing', reason: 'contested', age_ms, since_utc_ms, is_silent};
   if (is_silent) return {quality: 'stale', reason: facts.reason, age_ms, since_utc_ms, is_silent};
-  if (timing.contested) return {quality: 'degraded', reason: 'contested', age_ms, since_utc_ms, is_silent};
   if (COASTING.has(facts.reason)) return {quality: 'coasting', reason: facts.reason, age_ms, since_utc_ms, is_silent};
   if (facts.validity === 'degraded') return {quality: 'degraded', reason: facts.reason, age_ms, since_utc_ms, is_silent};
   return {quality: 'ok', reason: facts.reason, age_ms, since_utc_ms, is_silent};

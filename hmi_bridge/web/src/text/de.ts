@@ -479,6 +479,7 @@ export const de: Language = {
     clock_disagrees: ['Uhren von Steuerung und Konsole widersprechen sich', 'Beide am selben Zeitserver stellen; bis dahin gelten Werte als veraltet'],
     second_writer: ['Zwei Programme senden dasselbe: welches stimmt, ist unbekannt', 'Das fremde beenden'],
     interface_mismatch: ['Ein Programm anderer Fassung ist im Netz', 'Alle Programme auf dieselbe Fassung bringen'],
+    too_many_events: ['Mehr Ereignisse stehen an, als die Konsole hält', 'Erledigte quittieren; die übrigen stehen im Journal'],
     incompatible_qos: ['Ein Programm im Netz verlangt, was nicht geboten wird', 'Integrator verständigen'],
     sample_rejected: ['Vertragswidriges wurde gesandt und abgelehnt', 'Integrator verständigen'],
     silent: ['Ein Sender ist verstummt', 'Sehen, ob Programm und Gerät laufen'],

@@ -494,6 +494,7 @@ export const alarms = {
   clock_disagrees: ['Clocks of guidance and console disagree', 'Have both set by the same time server; until then values look stale'],
   second_writer: ['Two programs send the same topic: which is right is not known', 'End the one that does not belong here'],
   interface_mismatch: ['A program of another version is on the network', 'Bring all programs to the same version'],
+  too_many_events: ['More events stand than the console keeps', 'Answer those that are over; see the journal for the others'],
   incompatible_qos: ['A program on the network asks for what is not offered', 'Tell the integrator'],
   sample_rejected: ['Something that breaks the contract was sent and refused', 'Tell the integrator'],
   silent: ['A sender has fallen silent', 'See whether its program and device run'],

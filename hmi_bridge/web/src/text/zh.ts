@@ -479,6 +479,7 @@ export const zh: Language = {
     clock_disagrees: ['导向与操作台时钟不一致', '用同一时间服务器校时; 此前数值显示为过期'],
     second_writer: ['两个程序发送同一数据: 不知何者正确', '结束不应存在的那个'],
     interface_mismatch: ['网络上有其他版本的程序', '将所有程序升级到同一版本'],
+    too_many_events: ['未结束的事件超过控制台可保存数', '确认已结束的; 其余见日志'],
     incompatible_qos: ['网络上某程序的要求无法满足', '通知集成商'],
     sample_rejected: ['收到不合约定的数据, 已拒绝', '通知集成商'],
     silent: ['某发送者已无消息', '检查其程序与设备是否运行'],
