@@ -17,17 +17,26 @@ if(TBM_SANITIZE)
     target_compile_options(tbm_options INTERFACE -fno-sanitize=null,object-size,pointer-overflow,vptr)
   endif()
   target_link_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE})
-  # Aravis asks for it; what is precompiled must have been asked the same.
-  target_compile_options(tbm_options INTERFACE -pthread)
 endif()
+# Aravis asks for it; what is precompiled must have been asked the same.
+target_compile_options(tbm_options INTERFACE -pthread)
 
 # A test spends its time in what it tests; its own code compiles faster with less optimisation
 # (at which GCC 12 sees copies beyond the end of a std::string where there are none).
 set(tbm_test_optimisation -O1
     $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>)
 
-# What nearly every file includes, compiled once for each tree: a third less time for a test.
-# Product code gets it in the instrumented trees only; in the others an include that it lacks is noticed.
+# The edges (command lines, files, DDS, the console) wait for people, disks and networks: what they
+# gain from -O3 nobody sees, and what they cost the compiler everybody waits for. A folder of them sets
+# TBM_EDGE in its CMakeLists.txt. The camera box is slow enough for its edges to count.
+if(TBM_SANITIZE)
+  set(tbm_edge_optimisation -O0)
+elseif(NOT CMAKE_CROSSCOMPILING)
+  set(tbm_edge_optimisation ${tbm_test_optimisation} $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+endif()
+
+# What nearly every file includes, compiled once for each tree: a third less time for a test or an edge.
+# What computes gets it in the instrumented trees only; in the others an include that it lacks is noticed.
 set(tbm_common_headers
   <algorithm> <array> <atomic> <chrono> <cmath> <cstdint> <filesystem> <functional> <map> <memory> <mutex>
   <optional> <span> <string> <string_view> <thread> <vector> <Eigen/Core> <Eigen/Geometry> <Eigen/LU>)
@@ -46,6 +55,16 @@ function(tbm_use_precompiled target name)
   target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)
 endfunction()
 
+function(tbm_optimise target)
+  if(TBM_EDGE)
+    target_compile_options(${target} PRIVATE ${tbm_edge_optimisation})
+    tbm_use_precompiled(${target} tbm_precompiled_for_edges)
+    target_link_libraries(${target} PRIVATE fmt::fmt)
+  elseif(TBM_SANITIZE)
+    tbm_use_precompiled(${target} tbm_precompiled)
+  endif()
+endfunction()
+
 # Tests that also run under the sanitizers carry the label asan or tsan and are built by one target.
 add_custom_target(sanitized_tests)
 
@@ -54,9 +73,7 @@ function(tbm_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
   add_library(tbm_${name} STATIC ${ARG_SOURCES})
   target_link_libraries(tbm_${name} PUBLIC tbm_options ${ARG_DEPS})
-  if(TBM_SANITIZE)
-    tbm_use_precompiled(tbm_${name} tbm_precompiled)
-  endif()
+  tbm_optimise(tbm_${name})
 endfunction()
 
 # tbm_program(camera_box SOURCES main.cc DEPS ...)   makes the executable of that name in <build>/bin
@@ -64,6 +81,7 @@ function(tbm_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE tbm_options ${ARG_DEPS})
+  tbm_optimise(${name})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 endfunction()
 
