@@ -366,7 +366,7 @@ test('another build of the page is loaded by itself, and not under a dialog', ()
 }));
 
 lane = 1;
-test('accessible: all pages, day and night, all languages', () => With({isLoggedIn: false, allows: LOGGED_OUT}, async ({page}) => {
+test('accessible, and large enough to touch: all pages, day and night, all languages', () => With({isLoggedIn: false, allows: LOGGED_OUT}, async ({page}) => {
   await page.goto(url);
   await page.waitForSelector('form.login');
   const look = async (name) => {
@@ -375,13 +375,17 @@ test('accessible: all pages, day and night, all languages', () => With({isLogged
       const result = await window.axe.run(document, {resultTypes: ['violations']});
       return result.violations.map((one) => `${one.id}: ${one.nodes.slice(0, 2).map((node) => `${node.target} ${node.any[0]?.message ?? ''}`).join(' | ')}`);
     }, axe);
-    Check(found.length === 0, `${name}: ${found.join('; ')}`);
+    // A finger in a glove wants 44 px.
+    const small = await page.evaluate(() => [...document.querySelectorAll('button, input:not([type=checkbox]):not([type=radio]), select, .rail a')].flatMap((e) => {
+      const box = e.getBoundingClientRect();
+      return box.width > 0 && (box.height < 43.9 || box.width < 43.9) ? [`small target ${e.className || e.name || e.tagName} ${box.width.toFixed(0)}x${box.height.toFixed(0)}`] : [];
+    }));
+    Check(found.length === 0 && small.length === 0, `${name}: ${[...found, ...small].join('; ')}`);
   };
   await look('login');
   await LogIn(page, url);
   const faults = [];
-  // Colours are the theme's and names the language's: each with all pages, not each with each.
-  for (const [theme, language] of [['day', 'en'], ['night', 'en'], ['day', 'de'], ['night', 'zh']]) {
+  for (const [theme, language] of [['day', 'en'], ['night', 'en'], ['day', 'de'], ['night', 'de'], ['day', 'zh'], ['night', 'zh']]) {
     await page.evaluate(([a, b]) => localStorage.setItem('tbm.console.settings', JSON.stringify({language: a, theme: b})), [language, theme]);
     await page.reload();
     await Connection(page, 'live');
