@@ -10,7 +10,9 @@
 #include <fmt/format.h>
 
 #include "pose/base/angle.h"
+#include "pose/rig/camera_section.h"
 #include "pose/rig/rig_yaml.h"
+#include "pose/rig/yaml_rotation.h"
 
 namespace tbm {
 namespace {
@@ -114,19 +116,10 @@ class RigReader {
            "grid_points",
            "aspectRatio",
            "fix_aspect_ratio"});
-    CameraModel& model = rig_.camera;
-    model.image_width_px = camera.Required("image_width", "pixels of one row, 16 .. 32768")
-                               .Integer(16, 32768)
-                               .value_or(0);
-    model.image_height_px =
-        camera.Required("image_height", "rows, 16 .. 32768").Integer(16, 32768).value_or(0);
-    ReadDistortionModel(camera);
-    const std::size_t faults_before = faults_.size();
-    ReadMatrix(Section(camera, "camera_matrix", "with `data`, nine numbers row by row"));
-    ReadCoefficients(Section(camera, "distortion_coefficients", "with `data`, k1 k2 p1 p2 k3"));
-    if (faults_.size() == faults_before && model.image_width_px > 0 && model.image_height_px > 0) {
-      CheckLens(camera);
-    }
+    ReadCameraModel(
+        camera,
+        [this](const YamlNode& map, const std::set<std::string_view>& known) { Known(map, known); },
+        &rig_.camera);
 
     rig_.calibration_residual_px =
         camera.Optional("residual_px").Number({0.0, 100.0, "px"}).value_or(0.0);
@@ -137,99 +130,6 @@ class RigReader {
     rig_.gain_dn_per_electron =
         camera.Optional("gain_dn_per_electron").Number({0.0, 1000.0, "DN/electron", true});
     rig_.read_noise_dn = camera.Optional("read_noise_dn").Number({0.0, 1000.0, "DN"});
-  }
-
-  void ReadDistortionModel(const YamlNode& camera) {
-    // OpenCV's own files have no such key; with four or five coefficients they mean the same model.
-    const YamlNode node = camera.Optional("distortion_model");
-    const auto model = node.Text();
-    if (model && *model != "plumb_bob") {
-      node.Fault("must be plumb_bob (k1 k2 p1 p2 k3); calibrate again with that model");
-    }
-  }
-
-  void ReadMatrix(const YamlNode& matrix) {
-    if (!matrix.IsMap()) return;
-    Known(matrix, {"rows", "cols", "data", "dt"});
-    CheckShape(matrix, "rows", 3, 3);
-    CheckShape(matrix, "cols", 3, 3);
-    const YamlNode data = matrix.Required("data", "nine numbers: fx 0 cx 0 fy cy 0 0 1");
-    const auto k = data.Numbers(9, {-1e6, 1e6, "px"});
-    if (!k) return;
-    CameraModel& model = rig_.camera;
-    model.fx_px = (*k)[0];
-    model.cx_px = (*k)[2];
-    model.fy_px = (*k)[4];
-    model.cy_px = (*k)[5];
-    const bool has_pattern =
-        (*k)[1] == 0.0 && (*k)[3] == 0.0 && (*k)[6] == 0.0 && (*k)[7] == 0.0 && (*k)[8] == 1.0;
-    if (!has_pattern)
-      data.Fault("must have the form fx 0 cx 0 fy cy 0 0 1, row by row, without skew");
-    const auto items = data.Items();
-    if (model.fx_px <= 1.0) items[0].Fault("the focal length fx must be more than 1 px");
-    if (model.fy_px <= 1.0) items[4].Fault("the focal length fy must be more than 1 px");
-    CheckInside(items[2], "cx", model.cx_px, model.image_width_px);
-    CheckInside(items[5], "cy", model.cy_px, model.image_height_px);
-  }
-
-  static void CheckInside(const YamlNode& node,
-                          std::string_view name,
-                          double value_px,
-                          int size_px) {
-    if (size_px > 0 && (value_px < 0.0 || value_px > size_px)) {
-      node.Fault(fmt::format(
-          "the principal point {} = {} px lies outside the image; allowed is 0 .. {} px",
-          name,
-          value_px,
-          size_px));
-    }
-  }
-
-  static void CheckShape(const YamlNode& matrix, std::string_view name, int low, int high) {
-    (void)matrix.Optional(name).Integer(low, high);
-  }
-
-  void ReadCoefficients(const YamlNode& matrix) {
-    if (!matrix.IsMap()) return;
-    Known(matrix, {"rows", "cols", "data", "dt"});
-    CheckShape(matrix, "rows", 1, 14);
-    CheckShape(matrix, "cols", 1, 14);
-    const YamlNode data = matrix.Required("data", "five numbers: k1 k2 p1 p2 k3");
-    if (!data.exists()) return;
-    const std::size_t count = data.IsList() ? data.Items().size() : 0;
-    if (count != 4 && count != 5) {
-      data.Fault(
-          fmt::format("must be a list of k1 k2 p1 p2 k3 (k3 may be missing), has {} items", count));
-      return;
-    }
-    const auto c = data.Numbers(count, {-1e4, 1e4, ""});
-    if (!c) return;
-    CameraModel& model = rig_.camera;
-    model.k1 = (*c)[0];
-    model.k2 = (*c)[1];
-    model.p1 = (*c)[2];
-    model.p2 = (*c)[3];
-    model.k3 = count == 5 ? (*c)[4] : 0.0;
-  }
-
-  // A polynomial that folds back inside the image cannot be undone there: coefficients of another
-  // lens, or in another order.
-  void CheckLens(const YamlNode& camera) {
-    const CameraModel& model = rig_.camera;
-    const double right_px = model.image_width_px - 1.0;
-    const double bottom_px = model.image_height_px - 1.0;
-    for (const double u_px : {0.0, right_px}) {
-      for (const double v_px : {0.0, bottom_px}) {
-        if (NormalisedFromPixel(model, {u_px, v_px})) continue;
-        camera.Optional("distortion_coefficients")
-            .Fault(fmt::format(
-                "the lens model cannot be inverted at pixel ({}, {}); the order must be "
-                "k1 k2 p1 p2 k3, and k3 is often better left 0",
-                u_px,
-                v_px));
-        return;
-      }
-    }
   }
 
   void ReadLeds(const YamlNode& target) {
@@ -311,9 +211,9 @@ class RigReader {
   void ReadMount(const YamlNode& node, TiltMount& mount) {
     if (!node.IsMap()) return;
     Known(node, {"rotation", "sign", "sigma_deg", "mounting_sigma_deg"});
-    ReadRotation(
-        node.Required("rotation", "nine numbers, row by row, body frame into the housing's own"),
-        mount);
+    const auto rotation = RotationOf(
+        node.Required("rotation", "nine numbers, row by row, body frame into the housing's own"));
+    if (rotation) mount.tilt_from_body = *rotation;
     const YamlNode sign = node.Optional("sign");
     if (const auto signs = sign.Numbers(2, {-1.0, 1.0, ""})) {
       mount.sign = {(*signs)[0], (*signs)[1]};
@@ -326,33 +226,6 @@ class RigReader {
     mount.sigma_rad = DegToRad(sigma_deg.value_or(0.0));
     mount.mounting_sigma_rad =
         DegToRad(node.Optional("mounting_sigma_deg").Number({0.0, 10.0, "deg"}).value_or(0.0));
-  }
-
-  static void ReadRotation(const YamlNode& node, TiltMount& mount) {
-    const auto r = node.Numbers(9, {-1.001, 1.001, ""});
-    if (!r) return;
-    Eigen::Matrix3d rotation;
-    for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = (*r)[static_cast<std::size_t>(i)];
-    // Four printed decimals leave 1e-4 of disorder; more than 1e-3 is a wrong number.
-    constexpr double kMostDisorder = 1e-3;
-    const double disorder =
-        (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-    if (disorder > kMostDisorder) {
-      node.Fault(
-          fmt::format("is not a rotation: its rows are off unit length or right angles by {:.2g}; "
-                      "allowed is 0 .. {}",
-                      disorder,
-                      kMostDisorder));
-      return;
-    }
-    if (rotation.determinant() < 0.0) {
-      node.Fault(
-          "is a mirror image, not a rotation (determinant -1): one axis points the wrong way");
-      return;
-    }
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation,
-                                                Eigen::ComputeFullU | Eigen::ComputeFullV);
-    mount.tilt_from_body = svd.matrixU() * svd.matrixV().transpose();
   }
 
   void ReadPoints(const YamlNode& points) {
