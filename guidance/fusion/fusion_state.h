@@ -35,7 +35,7 @@ class FusionLayout {
   static constexpr int kGyroBias = 9;
   static constexpr int kAccelBias = 12;
   static constexpr int kCore = 15;
-  static constexpr int kMostModes = 14;
+  static constexpr int kMostModes = 24;
   static constexpr int kMost = kCore + 13 + kMostModes;
 
   FusionLayout() { at_.fill(-1); }

@@ -1,6 +1,7 @@
 #include "guidance/fusion/target_modes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -13,8 +14,9 @@ namespace {
 
 constexpr std::size_t kMostViews = 14;
 constexpr std::size_t kLeastTargets = 4;
-// What gyros and inclinometer know of the attitude between images at worst.
-const double kAttitudeSigma_rad = DegToRad(0.05);
+// What gyros and inclinometer know of the attitude between images, at worst and at best: where they
+// know much, other combinations matter than where the targets alone tell it.
+const std::array<double, 2> kAttitudeSigmas_rad = {DegToRad(0.05), DegToRad(0.001)};
 // An attitude error is worth what it does to a target at this distance.
 constexpr double kReach_m = 2.5;
 // Combinations that move the camera by less are left out.
@@ -25,6 +27,7 @@ constexpr double kLeastEffect_m = 2e-6;
 Eigen::MatrixXd Answer(const TargetView& view,
                        const CameraModel& camera,
                        double residual_px,
+                       double attitude_sigma_rad,
                        const std::vector<SurveyedTarget>& targets) {
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::MatrixXd pull = Eigen::MatrixXd::Zero(6, static_cast<Eigen::Index>(3 * targets.size()));
@@ -42,7 +45,7 @@ Eigen::MatrixXd Answer(const TargetView& view,
     information += weight * by_pose.transpose() * by_pose;
     pull.middleCols<3>(3 * target) = weight * by_pose.transpose() * by_target * one.sigma_m;
   }
-  const double attitude = kAttitudeSigma_rad * kReach_m;
+  const double attitude = attitude_sigma_rad * kReach_m;
   information.bottomRightCorner<3, 3>() += Eigen::Matrix3d::Identity() / (attitude * attitude);
   return information.ldlt().solve(pull);
 }
@@ -62,12 +65,16 @@ TargetModes FindTargetModes(std::span<const TargetView> views,
   if (rich.empty()) return {};
 
   const std::size_t count = std::min(rich.size(), kMostViews);
-  Eigen::MatrixXd answers(static_cast<Eigen::Index>(6 * count),
+  const auto kEach = static_cast<Eigen::Index>(6 * kAttitudeSigmas_rad.size());
+  Eigen::MatrixXd answers(kEach * static_cast<Eigen::Index>(count),
                           static_cast<Eigen::Index>(3 * targets->size()));
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t pick = count == 1 ? 0 : i * (rich.size() - 1) / (count - 1);
-    answers.middleRows<6>(static_cast<Eigen::Index>(6 * i)) =
-        Answer(*rich[pick], camera, residual_px, *targets);
+    for (std::size_t k = 0; k < kAttitudeSigmas_rad.size(); ++k) {
+      answers.middleRows<6>(kEach * static_cast<Eigen::Index>(i) +
+                            6 * static_cast<Eigen::Index>(k)) =
+          Answer(*rich[pick], camera, residual_px, kAttitudeSigmas_rad[k], *targets);
+    }
   }
   // Principal axes of what the views see: largest last.
   const Eigen::MatrixXd gram = answers * answers.transpose();
