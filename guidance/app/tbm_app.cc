@@ -10,11 +10,13 @@
 
 #include "guidance/app/ask_command.h"
 #include "guidance/app/axis_options.h"
+#include "guidance/app/calibrate_options.h"
 #include "guidance/app/chain_command.h"
 #include "guidance/app/chain_input.h"
 #include "guidance/app/check_command.h"
 #include "guidance/app/completion.h"
 #include "guidance/app/journal_options.h"
+#include "guidance/app/rail_options.h"
 #include "guidance/app/solve_command.h"
 #include "guidance/app/study_command.h"
 #include "guidance/app/watch_command.h"
@@ -165,7 +167,11 @@ struct Requests {
   WatchRequest watch;
   AskRequest ask;
   AxisRequests axis;
+  CalibrateRequests calibrate;
   JournalRequests journal;
+  LineRequest line;
+  SettleRequest settle;
+  GeometryRequest geometry;
   std::string align = "none";
   std::string format = "csv";
   std::string method = "fused";
@@ -311,6 +317,10 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   const CLI::App* centres = AddCentres(app, requests);
   const CLI::App* check = AddCheck(app, requests);
   const CLI::App* axis = AddAxis(app, requests.axis);
+  const CLI::App* calibrate = AddCalibrate(app, requests.calibrate);
+  const CLI::App* line = AddLine(app, requests.line);
+  const CLI::App* settle = AddSettle(app, requests.settle);
+  const CLI::App* geometry = AddGeometry(app, requests.geometry);
   const CLI::App* study = AddStudy(app, requests);
   const CLI::App* watch = AddWatch(app, requests);
   const CLI::App* ask = AddAsk(app, requests);
@@ -339,6 +349,10 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   }
   if (check->parsed()) return RunCheck(requests.check, console);
   if (axis->parsed()) return RunAxis(*axis, requests.axis, console);
+  if (calibrate->parsed()) return RunCalibrate(*calibrate, requests.calibrate, console);
+  if (line->parsed()) return RunLine(requests.line, console);
+  if (settle->parsed()) return RunSettle(requests.settle, console);
+  if (geometry->parsed()) return RunGeometry(requests.geometry, console);
   if (study->parsed()) return RunStudy(requests.study, console);
   if (watch->parsed()) return RunWatch(requests.watch, console);
   if (ask->parsed()) return RunAsk(requests.ask, console);

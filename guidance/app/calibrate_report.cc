@@ -1,0 +1,194 @@
+#include "guidance/app/calibrate_report.h"
+
+#include <array>
+#include <cmath>
+#include <iterator>
+
+#include <Eigen/Eigenvalues>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "pose/base/angle.h"
+
+namespace tbm {
+namespace {
+
+// A string of JSON is one of YAML too.
+std::string InQuotes(const std::string& text) {
+  return nlohmann::json(text).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+}
+
+template <class Matrix>
+std::string RowByRow(const Matrix& matrix, const char* format) {
+  std::string list = "[";
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    for (Eigen::Index column = 0; column < matrix.cols(); ++column) {
+      if (row + column > 0) list += ", ";
+      fmt::format_to(std::back_inserter(list), fmt::runtime(format), matrix(row, column));
+    }
+  }
+  return list + "]";
+}
+
+std::string LeftOut(const CameraCalibration& found, const FoundBoards& boards) {
+  std::string list;
+  for (std::size_t i = 0; i < found.pictures.size(); ++i) {
+    if (found.pictures[i].used) continue;
+    list += (list.empty() ? "" : ", ") + InQuotes(boards.pictures[i].name);
+  }
+  return "[" + list + "]";
+}
+
+std::size_t UsedPictures(const CameraCalibration& found) {
+  std::size_t used = 0;
+  for (const CalibrationPicture& picture : found.pictures) used += picture.used ? 1 : 0;
+  return used;
+}
+
+double LargestSigma_rad(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);
+  return std::sqrt(axes.eigenvalues()[2]);
+}
+
+}  // namespace
+
+std::string CameraYaml(const CameraCalibration& found,
+                       const FoundBoards& boards,
+                       const std::string& board) {
+  const CameraModel& c = found.camera;
+  const IntrinsicVector sigma = found.covariance.diagonal().cwiseSqrt();
+  const bool has_k3 = sigma(8) > 0.0;
+  std::string text = "camera:\n";
+  const auto add = [&text](const auto& line) { text += line; };
+  add(fmt::format("  image_width: {}\n  image_height: {}\n  distortion_model: plumb_bob\n",
+                  c.image_width_px,
+                  c.image_height_px));
+  add(
+      fmt::format("  camera_matrix: {{rows: 3, cols: 3, data: [{:.6f}, 0.0, {:.6f}, 0.0, {:.6f}, "
+                  "{:.6f}, 0.0, 0.0, 1.0]}}\n",
+                  c.fx_px,
+                  c.cx_px,
+                  c.fy_px,
+                  c.cy_px));
+  add(
+      fmt::format("  distortion_coefficients: {{rows: 1, cols: 5, data: [{:.9f}, {:.9f}, {:.9f}, "
+                  "{:.9f}, {:.9f}]}}   # k1 k2 p1 p2 k3\n",
+                  c.k1,
+                  c.k2,
+                  c.p1,
+                  c.p2,
+                  c.k3));
+  add(fmt::format("  residual_px: {:.5f}          # sigma of one coordinate of a point\n",
+                  found.residual_px));
+  add(fmt::format("  intrinsics_sigma_px: [{:.5f}, {:.5f}, {:.5f}, {:.5f}]   # fx fy cx cy\n",
+                  sigma(0),
+                  sigma(1),
+                  sigma(2),
+                  sigma(3)));
+  add("# What these numbers rest on. No part of a rig file.\ncalibrated:\n");
+  add(fmt::format("  board: {}\n", InQuotes(board)));
+  add(fmt::format("  pictures: {}\n  left_out: {}\n  degrees_of_freedom: {}\n",
+                  UsedPictures(found),
+                  LeftOut(found, boards),
+                  found.dof));
+  add(
+      fmt::format("  share_of_image_cells: {:.3f}\n  tilt_about_horizontal_deg: {:.2f}\n  "
+                  "tilt_about_vertical_deg: {:.2f}\n",
+                  found.coverage.share,
+                  RadToDeg(found.coverage.tilt_about_u_rad),
+                  RadToDeg(found.coverage.tilt_about_v_rad)));
+  add(fmt::format("  distortion_sigma: [{:.9f}, {:.9f}, {:.9f}, {:.9f}, {}]\n",
+                  sigma(4),
+                  sigma(5),
+                  sigma(6),
+                  sigma(7),
+                  has_k3 ? fmt::format("{:.9f}", sigma(8)) : "null"));
+  const int parameters = has_k3 ? kIntrinsics : kIntrinsics - 1;
+  add(
+      fmt::format("  # row by row; in this order, px and px2 where the parameter is in px\n"
+                  "  covariance_of: [fx, fy, cx, cy, k1, k2, p1, p2{}]\n  covariance: {}\n",
+                  has_k3 ? ", k3" : "",
+                  RowByRow(found.covariance.topLeftCorner(parameters, parameters), "{:.6e}")));
+  return text;
+}
+
+std::string CameraSummary(const CameraCalibration& found, const FoundBoards& boards) {
+  constexpr std::array<const char*, kIntrinsics> kNames = {
+      "fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"};
+  const IntrinsicVector values = IntrinsicsOf(found.camera);
+  std::string text = fmt::format(
+      "{} pictures, residual {:.3f} px, {:.0f} % of the image's cells, tilts {:.0f} and {:.0f} "
+      "degrees\n",
+      UsedPictures(found),
+      found.residual_px,
+      100.0 * found.coverage.share,
+      RadToDeg(found.coverage.tilt_about_u_rad),
+      RadToDeg(found.coverage.tilt_about_v_rad));
+  for (int i = 0; i < kIntrinsics; ++i) {
+    const double sigma = std::sqrt(found.covariance(i, i));
+    if (!(sigma > 0.0)) continue;
+    const int digits = i < 4 ? 3 : 6;
+    text += fmt::format("  {:6} {:14.{}f}  +- {:.{}f}\n",
+                        kNames[static_cast<std::size_t>(i)],
+                        values(i),
+                        digits,
+                        sigma,
+                        digits);
+  }
+  for (std::size_t i = 0; i < found.pictures.size(); ++i) {
+    const CalibrationPicture& picture = found.pictures[i];
+    if (picture.used) continue;
+    text +=
+        fmt::format("  left out: {}, {}\n",
+                    boards.pictures[i].name,
+                    picture.is_placed ? fmt::format("its points are {:.2f} px off", picture.rms_px)
+                                      : "its points fit no placement of the board");
+  }
+  return text;
+}
+
+std::string TiltYaml(const TiltResult& result) {
+  const TiltRotation& found = result.rotation;
+  const Eigen::Matrix3d housing_from_camera = found.camera_from_housing.transpose();
+  const double per_rad = RadToDeg(1.0);
+  std::string text = "inclinometers:\n  camera:\n";
+  text += "    # row by row, from the camera's frame into the housing's own\n    rotation: " +
+          RowByRow(housing_from_camera, "{:.9f}") + "\n";
+  if (result.sign[0] != 1.0 || result.sign[1] != 1.0) {
+    text += fmt::format("    sign: [{:+.0f}, {:+.0f}]\n", result.sign[0], result.sign[1]);
+  }
+  text += fmt::format("    sigma_deg: {}\n    mounting_sigma_deg: {:.5f}\n",
+                      result.sigma_deg,
+                      RadToDeg(LargestSigma_rad(found.covariance)));
+  text += "# What these numbers rest on. No part of a rig file.\ncalibrated:\n";
+  text += fmt::format(
+      "  pictures: {}\n  board_residual_px: {:.4f}\n  chi2: {:.2f}\n  "
+      "degrees_of_freedom: {}\n",
+      result.pictures,
+      result.residual_px,
+      found.chi2,
+      found.dof);
+  text += "  # of the turn that is still missing, about the camera's axes\n  covariance_deg2: " +
+          RowByRow(Eigen::Matrix3d(per_rad * per_rad * found.covariance), "{:.6e}") + "\n";
+  text += "  up_in_board: " + RowByRow(found.up_in_board.transpose().eval(), "{:.9f}") + "\n";
+  if (!result.up_was_given) {
+    text += fmt::format("  up_sigma_deg: {:.5f}\n", RadToDeg(found.up_sigma_rad));
+  }
+  return text;
+}
+
+std::string TiltSummary(const TiltResult& result) {
+  const Eigen::Vector3d sigma_deg =
+      RadToDeg(1.0) * result.rotation.covariance.diagonal().cwiseSqrt();
+  return fmt::format(
+      "{} placements; sigma {:.4f} / {:.4f} / {:.4f} degrees about the camera's x / y / z; chi2 "
+      "{:.1f} of {} degrees of freedom\n",
+      result.pictures,
+      sigma_deg.x(),
+      sigma_deg.y(),
+      sigma_deg.z(),
+      result.rotation.chi2,
+      result.rotation.dof);
+}
+
+}  // namespace tbm

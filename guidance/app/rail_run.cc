@@ -1,0 +1,370 @@
+#include "guidance/app/rail_run.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "guidance/config/rail_file.h"
+#include "pose/base/angle.h"
+
+namespace tbm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array<std::string_view, 7> kImuColumns = {"stamp_ns",
+                                                         "gyro_x_rad_s",
+                                                         "gyro_y_rad_s",
+                                                         "gyro_z_rad_s",
+                                                         "accel_x_m_s2",
+                                                         "accel_y_m_s2",
+                                                         "accel_z_m_s2"};
+constexpr std::array<std::string_view, 4> kTiltColumns = {
+    "stamp_ns", "sensor", "beta_deg", "gamma_deg"};
+constexpr std::array<std::string_view, 4> kCentreColumns = {"stamp_ns", "target", "u_px", "v_px"};
+constexpr std::array<std::string_view, 5> kTargetColumns = {
+    "target", "x_m", "y_m", "z_m", "sigma_mm"};
+constexpr std::array<std::string_view, 8> kTruthColumns = {
+    "stamp_ns", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"};
+constexpr std::array<std::string_view, 2> kOdometerColumns = {"stamp_ns", "distance_m"};
+
+constexpr std::string_view kTiltSensor = "trolley";
+// Noise never shows one number so often on end.
+constexpr std::size_t kFrozenRows = 12;
+constexpr std::size_t kMostFaults = 20;
+
+class RailRunLoader {
+ public:
+  explicit RailRunLoader(const std::string& folder) : folder_(folder) {}
+
+  Result<RailRun, FileFaults> Load() {
+    std::error_code ignored;
+    if (!fs::is_directory(folder_, ignored)) {
+      return Failure{FileFaults{
+          {folder_, 0, "", "is not a folder; a rail run is a folder with rail.yaml and imu.csv"}}};
+    }
+    LoadSetup();
+    LoadImu();
+    LoadTilts();
+    LoadTargets();
+    LoadCentres();
+    LoadOdometer();
+    LoadTruth();
+    if (!faults_.empty()) return Failure{std::move(faults_)};
+    return std::move(run_);
+  }
+
+ private:
+  std::string PathOf(std::string_view name) const {
+    return (fs::path(folder_) / fs::path(std::string(name))).string();
+  }
+  bool Has(std::string_view name) const {
+    std::error_code ignored;
+    return fs::exists(PathOf(name), ignored);
+  }
+  bool Fault(FileFault fault) {
+    if (faults_.size() < kMostFaults) faults_.push_back(std::move(fault));
+    return false;
+  }
+
+  void LoadSetup() {
+    auto setup = LoadRailSetup(PathOf("rail.yaml"));
+    if (setup) {
+      run_.setup = std::move(setup).value();
+      return;
+    }
+    for (const RigFileFault& fault : setup.error()) {
+      Fault({fault.file,
+             fault.line,
+             "",
+             fault.key.empty() ? fault.what : fault.key + ": " + fault.what});
+    }
+  }
+
+  std::optional<CsvTable> Table(std::string_view name, std::span<const std::string_view> columns) {
+    auto text = ReadTextFile(PathOf(name));
+    if (!text) {
+      Fault(text.error());
+      return {};
+    }
+    auto table = CsvTable::Parse(std::move(text).value(), PathOf(name), columns);
+    if (!table) {
+      Fault(table.error());
+      return {};
+    }
+    CsvTable whole = std::move(table).value();
+    if (whole.last_line_is_open() && whole.row_count() > 0) {
+      run_.warnings.push_back(
+          fmt::format("{}: the last line is cut short and passed over", PathOf(name)));
+      whole.DropLastRow();
+    }
+    return whole;
+  }
+
+  // A row's stamp, later than the one before (or the same, where a stamp has several rows).
+  bool Stamp(const CsvTable& table,
+             std::size_t row,
+             bool may_repeat,
+             std::optional<Timestamp>* last,
+             Timestamp* at) {
+    const std::size_t column = *table.Column("stamp_ns");
+    const auto stamp = table.Integer(row, column);
+    if (!stamp) return Fault(stamp.error());
+    *at = {*stamp};
+    if (*last && (at->ns < (*last)->ns || (!may_repeat && at->ns == (*last)->ns))) {
+      return Fault(table.FaultAt(
+          row,
+          column,
+          fmt::format("{} is {} the row before ({}); rows must stand in the order of time",
+                      at->ns,
+                      at->ns == (*last)->ns ? "the stamp of" : "earlier than",
+                      (*last)->ns)));
+    }
+    *last = *at;
+    return true;
+  }
+
+  bool Number(const CsvTable& table, std::size_t row, std::string_view name, double* value) {
+    const auto number = table.Finite(row, *table.Column(name));
+    if (!number) return Fault(number.error());
+    *value = *number;
+    return true;
+  }
+
+  template <std::size_t kCount>
+  bool Numbers(const CsvTable& table,
+               std::size_t row,
+               const std::array<std::string_view, kCount>& names,
+               std::size_t first,
+               double* values) {
+    for (std::size_t i = first; i < kCount; ++i) {
+      if (!Number(table, row, names[i], &values[i - first])) return false;
+    }
+    return true;
+  }
+
+  void LoadImu() {
+    const auto table = Table("imu.csv", kImuColumns);
+    if (!table) return;
+    if (table->row_count() < 2) {
+      Fault({PathOf("imu.csv"), 0, "", "has no two samples"});
+      return;
+    }
+    const double nominal_s = 1.0 / run_.setup.imu.rate_hz;
+    std::optional<Timestamp> last;
+    std::optional<Timestamp> before;
+    for (std::size_t row = 0; row < table->row_count(); ++row) {
+      ImuSample sample;
+      std::array<double, 6> v{};
+      if (!Stamp(*table, row, false, &last, &sample.ends_at)) return;
+      if (!Numbers(*table, row, kImuColumns, 1, v.data())) return;
+      sample.gyro_rad_s = {v[0], v[1], v[2]};
+      sample.accel_m_s2 = {v[3], v[4], v[5]};
+      sample.interval_s = before ? SecondsBetween(*before, sample.ends_at) : nominal_s;
+      if (before && sample.interval_s > 1.5 * nominal_s) {
+        run_.warnings.push_back(
+            table
+                ->FaultAt(row,
+                          0,
+                          fmt::format("{:.0f} ms are missing before this sample",
+                                      1e3 * (sample.interval_s - nominal_s)))
+                .Text());
+      }
+      before = sample.ends_at;
+      run_.recording.imu.push_back(sample);
+    }
+    CheckRate(*table, nominal_s);
+    for (std::size_t axis = 0; axis < 6; ++axis) CheckFrozen(*table, axis);
+  }
+
+  // Half of the intervals may be longer, half shorter.
+  void CheckRate(const CsvTable& table, double nominal_s) {
+    std::vector<double> spans;
+    for (const ImuSample& sample : run_.recording.imu) spans.push_back(sample.interval_s);
+    std::nth_element(
+        spans.begin(), spans.begin() + static_cast<std::ptrdiff_t>(spans.size() / 2), spans.end());
+    const double median_s = spans[spans.size() / 2];
+    if (std::abs(median_s / nominal_s - 1.0) < 0.2) return;
+    Fault(table.FaultAt(
+        1,
+        0,
+        fmt::format("rows come every {:.4g} ms, and rail.yaml says imu.rate_hz: {} ({:.4g} ms)",
+                    1e3 * median_s,
+                    run_.setup.imu.rate_hz,
+                    1e3 * nominal_s)));
+  }
+
+  void CheckFrozen(const CsvTable& table, std::size_t axis) {
+    const auto value = [&](std::size_t row) {
+      const ImuSample& sample = run_.recording.imu[row];
+      return axis < 3 ? sample.gyro_rad_s[static_cast<Eigen::Index>(axis)]
+                      : sample.accel_m_s2[static_cast<Eigen::Index>(axis - 3)];
+    };
+    double largest = 0.0;
+    for (std::size_t row = 0; row < run_.recording.imu.size(); ++row) {
+      largest = std::max(largest, std::abs(value(row)));
+    }
+    std::size_t begin = 0;
+    for (std::size_t row = 1; row <= run_.recording.imu.size(); ++row) {
+      if (row < run_.recording.imu.size() && value(row) == value(begin)) continue;
+      const bool is_saturated = std::abs(value(begin)) == largest && largest > 0.0;
+      if (row - begin >= (is_saturated ? kFrozenRows / 2 : kFrozenRows)) {
+        Fault(table.FaultAt(
+            begin,
+            *table.Column(kImuColumns[axis + 1]),
+            fmt::format(
+                "is {} in {} rows on end: the sensor is {}",
+                table.Field(begin, *table.Column(kImuColumns[axis + 1])),
+                row - begin,
+                is_saturated ? "saturated; the run cannot be used beyond this row" : "frozen")));
+        return;
+      }
+      begin = row;
+    }
+  }
+
+  void LoadTilts() {
+    if (!Has("tilt.csv")) {
+      run_.warnings.push_back(PathOf("tilt.csv") +
+                              ": is not there: level comes from the "
+                              "accelerometers alone");
+      return;
+    }
+    const auto table = Table("tilt.csv", kTiltColumns);
+    if (!table) return;
+    std::optional<Timestamp> last;
+    for (std::size_t row = 0; row < table->row_count(); ++row) {
+      const std::size_t sensor = *table->Column("sensor");
+      if (table->Field(row, sensor) != kTiltSensor) {
+        Fault(table->FaultAt(
+            row,
+            sensor,
+            fmt::format("{} is not {}", Quoted(table->Field(row, sensor)), kTiltSensor)));
+        return;
+      }
+      TiltSample tilt;
+      double beta_deg = 0.0;
+      double gamma_deg = 0.0;
+      if (!Stamp(*table, row, false, &last, &tilt.sensed_at)) return;
+      if (!Number(*table, row, "beta_deg", &beta_deg)) return;
+      if (!Number(*table, row, "gamma_deg", &gamma_deg)) return;
+      if (std::abs(beta_deg) > 89.0 || std::abs(gamma_deg) > 89.0) {
+        Fault(table->FaultAt(
+            row, *table->Column("beta_deg"), "and gamma_deg must lie between -89 and 89 degrees"));
+        return;
+      }
+      tilt.angles = {DegToRad(beta_deg), DegToRad(gamma_deg)};
+      run_.recording.tilts.push_back(tilt);
+    }
+  }
+
+  void LoadTargets() {
+    if (!Has("targets.csv")) return;
+    const auto table = Table("targets.csv", kTargetColumns);
+    if (!table) return;
+    for (std::size_t row = 0; row < table->row_count(); ++row) {
+      SurveyedTarget target;
+      const std::size_t column = *table->Column("target");
+      target.name = std::string(table->Field(row, column));
+      std::array<double, 4> v{};
+      if (!Numbers(*table, row, kTargetColumns, 1, v.data())) return;
+      target.in_world_m = {v[0], v[1], v[2]};
+      if (v[3] < 0.0) {
+        Fault(table->FaultAt(row, *table->Column("sigma_mm"), "must not be below 0"));
+        return;
+      }
+      target.sigma_m = 1e-3 * v[3];
+      if (target.name.empty() ||
+          !target_at_.emplace(target.name, static_cast<int>(run_.recording.targets.size()))
+               .second) {
+        Fault(table->FaultAt(
+            row, column, fmt::format("{} stands twice or is empty", Quoted(target.name))));
+        return;
+      }
+      run_.recording.targets.push_back(std::move(target));
+    }
+  }
+
+  void LoadCentres() {
+    if (!Has("centres.csv")) return;
+    const auto table = Table("centres.csv", kCentreColumns);
+    if (!table) return;
+    std::vector<TargetImage>& images = run_.recording.images;
+    std::set<int> seen;
+    std::optional<Timestamp> last;
+    for (std::size_t row = 0; row < table->row_count(); ++row) {
+      Timestamp at;
+      if (!Stamp(*table, row, true, &last, &at)) return;
+      const std::size_t column = *table->Column("target");
+      const auto known = target_at_.find(std::string(table->Field(row, column)));
+      if (known == target_at_.end()) {
+        Fault(table->FaultAt(
+            row,
+            column,
+            fmt::format("{} does not stand in targets.csv", Quoted(table->Field(row, column)))));
+        return;
+      }
+      TargetPixel pixel;
+      pixel.target = known->second;
+      if (!Number(*table, row, "u_px", &pixel.pixel_px.x())) return;
+      if (!Number(*table, row, "v_px", &pixel.pixel_px.y())) return;
+      if (images.empty() || images.back().stamped_at < at) {
+        images.push_back({at, {}});
+        seen.clear();
+      }
+      if (!seen.insert(pixel.target).second) {
+        Fault(
+            table->FaultAt(row, column, fmt::format("{} stands twice at {}", known->first, at.ns)));
+        return;
+      }
+      images.back().pixels.push_back(pixel);
+    }
+  }
+
+  void LoadOdometer() {
+    if (!Has("odometer.csv")) return;
+    const auto table = Table("odometer.csv", kOdometerColumns);
+    if (!table) return;
+    std::optional<Timestamp> last;
+    for (std::size_t row = 0; row < table->row_count(); ++row) {
+      OdometerReading reading;
+      if (!Stamp(*table, row, false, &last, &reading.sensed_at)) return;
+      if (!Number(*table, row, "distance_m", &reading.distance_m)) return;
+      run_.recording.odometer.push_back(reading);
+    }
+  }
+
+  void LoadTruth() {
+    if (!Has("truth.csv")) return;
+    const auto table = Table("truth.csv", kTruthColumns);
+    if (!table) return;
+    std::optional<Timestamp> last;
+    for (std::size_t row = 0; row < table->row_count(); ++row) {
+      RailTruthRow truth;
+      std::array<double, 7> v{};
+      if (!Stamp(*table, row, false, &last, &truth.at)) return;
+      if (!Numbers(*table, row, kTruthColumns, 1, v.data())) return;
+      truth.position_world_m = {v[0], v[1], v[2]};
+      truth.world_from_imu = Eigen::Quaterniond(v[3], v[4], v[5], v[6]).normalized();
+      run_.truth.push_back(truth);
+    }
+  }
+
+  const std::string folder_;
+  RailRun run_;
+  FileFaults faults_;
+  std::map<std::string, int> target_at_;
+};
+
+}  // namespace
+
+Result<RailRun, FileFaults> ReadRailRun(const std::string& folder) {
+  return RailRunLoader(folder).Load();
+}
+
+}  // namespace tbm

@@ -1,0 +1,155 @@
+#include "guidance/config/rail_file.h"
+
+#include <cmath>
+#include <optional>
+
+#include "pose/base/angle.h"
+#include "pose/rig/camera_section.h"
+#include "pose/rig/yaml_rotation.h"
+#include "pose/rig/yaml_section.h"
+
+namespace tbm {
+namespace {
+
+constexpr double kStandardGravity_m_s2 = 9.80665;
+constexpr double kSecondsPerHour = 3600.0;
+
+// A bias that wanders within `sigma` over kBiasTime_s, as a walk [unit / sqrt(s)].
+double WalkOf(double sigma) { return sigma * std::sqrt(2.0 / kBiasTime_s); }
+
+void ReadImu(const YamlNode& node, RailImu* imu) {
+  if (!node.IsMap()) {
+    if (node.exists()) node.Fault("must be a map with rate_hz, angle_random_walk_deg_sqrt_h, ..");
+    return;
+  }
+  YamlSection keys(node);
+  const auto number = [&](std::string_view name, double high, std::string_view unit) {
+    const auto value =
+        keys.Require(name, "from the unit's data sheet").Number({0.0, high, unit, true});
+    return value.value_or(1.0);
+  };
+  const auto optional = [&](std::string_view name, double high, std::string_view unit) {
+    double value = 0.0;
+    keys.Number(name, 0.0, high, unit, &value);
+    return value;
+  };
+  imu->rate_hz = number("rate_hz", 10'000.0, "Hz");
+  imu->noise.angle_random_walk_rad =
+      DegToRad(number("angle_random_walk_deg_sqrt_h", 100.0, "deg/sqrt(h)")) /
+      std::sqrt(kSecondsPerHour);
+  imu->noise.velocity_random_walk_m_s =
+      number("velocity_random_walk_ug_sqrt_hz", 1e5, "ug/sqrt(Hz)") * 1e-6 * kStandardGravity_m_s2;
+  imu->gyro_bias_sigma_rad_s = DegToRad(number("gyro_bias_deg_h", 1e5, "deg/h")) / kSecondsPerHour;
+  imu->accel_bias_sigma_m_s2 = number("accel_bias_mg", 1000.0, "mg") * 1e-3 * kStandardGravity_m_s2;
+  imu->noise.gyro_bias_walk_rad_s =
+      WalkOf(DegToRad(optional("gyro_instability_deg_h", 1e5, "deg/h")) / kSecondsPerHour);
+  imu->noise.accel_bias_walk_m_s2 =
+      WalkOf(optional("accel_instability_ug", 1e6, "ug") * 1e-6 * kStandardGravity_m_s2);
+  keys.RefuseOthers();
+}
+
+std::optional<TiltMounting> ReadTilt(const YamlNode& node) {
+  if (!IsSection(node)) return {};
+  YamlSection keys(node);
+  TiltMounting tilt;
+  const auto rotation =
+      RotationOf(keys.Require("rotation", "nine numbers, row by row, imu frame into the housing"));
+  if (rotation) tilt.housing_from_imu = Eigen::Quaterniond(*rotation);
+  const auto sigma_deg =
+      keys.Require("sigma_deg", "noise of one reading").Number({0.0, 10.0, "deg", true});
+  tilt.sigma_rad = DegToRad(sigma_deg.value_or(1.0));
+  keys.RefuseOthers();
+  return tilt;
+}
+
+std::optional<RailCamera> ReadCamera(const YamlNode& node) {
+  if (!IsSection(node)) return {};
+  YamlSection keys(node);
+  for (const char* key : {"image_width",
+                          "image_height",
+                          "distortion_model",
+                          "camera_matrix",
+                          "distortion_coefficients"}) {
+    (void)keys.Know(key);
+  }
+  RailCamera camera;
+  ReadCameraModel(
+      node, [](const YamlNode&, const std::set<std::string_view>&) {}, &camera.model);
+  const auto residual_px =
+      keys.Require("residual_px", "sigma of one coordinate of an image point, e.g. 0.1")
+          .Number({0.0, 100.0, "px", true});
+  camera.residual_px = residual_px.value_or(1.0);
+  const auto rotation =
+      RotationOf(keys.Require("rotation", "nine numbers, row by row, imu frame into camera"));
+  if (rotation) camera.camera_from_imu = Eigen::Quaterniond(*rotation);
+  const auto position = keys.Require("position_m", "[x, y, z] of the camera in the imu frame")
+                            .Numbers(3, {-100.0, 100.0, "m"});
+  if (position) camera.in_imu_m = {(*position)[0], (*position)[1], (*position)[2]};
+  double sigma_deg = 0.0;
+  keys.Number("sigma_rotation_deg", 0.0, 10.0, "deg", &sigma_deg);
+  camera.sigma_rotation_rad = DegToRad(sigma_deg);
+  keys.Scaled("sigma_position_mm", 0.0, 1000.0, "mm", 1e3, &camera.sigma_position_m);
+  keys.Number("time_offset_s", -1.0, 1.0, "s", &camera.time_offset_s);
+  keys.Number("sigma_time_offset_s", 0.0, 1.0, "s", &camera.sigma_time_offset_s);
+  keys.RefuseOthers();
+  return camera;
+}
+
+void ReadStart(const YamlNode& node, RailStart* start) {
+  if (!node.IsMap()) {
+    if (node.exists()) node.Fault("must be a map {position_m: [x, y, z], at_rest_s: 10, ..}");
+    return;
+  }
+  YamlSection keys(node);
+  const auto position =
+      keys.Require("position_m", "[x, y, z] of the unit in the world").Numbers(3, {-1e8, 1e8, "m"});
+  if (position) start->position_world_m = {(*position)[0], (*position)[1], (*position)[2]};
+  keys.Scaled("sigma_position_mm", 0.0, 1e5, "mm", 1e3, &start->sigma_position_m);
+  const auto at_rest_s =
+      keys.Require("at_rest_s", "how long the trolley rests at first, at least 2 s")
+          .Number({2.0, 86'400.0, "s"});
+  start->at_rest_s = at_rest_s.value_or(2.0);
+  bool heading_known = false;
+  keys.Flag("heading_known", &heading_known);
+  double heading_deg = 0.0;
+  const YamlNode heading = keys.Know("heading_deg");
+  if (heading.exists()) {
+    heading_deg = heading.Number({-360.0, 360.0, "deg"}).value_or(0.0);
+  } else if (heading_known) {
+    node.Fault(
+        "says heading_known: true, and there is no heading_deg (of the unit's x in the "
+        "world, from x towards y)");
+  }
+  if (heading_known) start->heading_rad = DegToRad(heading_deg);
+  keys.RefuseOthers();
+}
+
+RailSetup Read(const YamlNode& root) {
+  RailSetup setup;
+  if (!root.IsMap()) {
+    root.Fault("is not a map with gravity_m_s2, imu, tilt, camera and start");
+    return setup;
+  }
+  YamlSection keys(root);
+  keys.Number("gravity_m_s2", 9.7, 9.9, "m/s2", &setup.gravity_m_s2);
+  ReadImu(keys.Require("imu", "rate and noise of the inertial unit"), &setup.imu);
+  setup.tilt = ReadTilt(keys.Know("tilt"));
+  setup.camera = ReadCamera(keys.Know("camera"));
+  ReadStart(keys.Require("start", "where the run begins and how long it rests"), &setup.start);
+  keys.RefuseOthers();
+  return setup;
+}
+
+}  // namespace
+
+Result<RailSetup, RigFileFaults> ParseRailSetup(std::string_view yaml, const std::string& file) {
+  return ReadYaml(yaml, file, [](const YamlNode& root) { return Read(root); });
+}
+
+Result<RailSetup, RigFileFaults> LoadRailSetup(const std::string& path) {
+  const auto text = ReadConfigText(path, "rail.yaml");
+  if (!text) return Failure{text.error()};
+  return ParseRailSetup(*text, path);
+}
+
+}  // namespace tbm

@@ -1,0 +1,243 @@
+#include "guidance/rail/rail_start.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "pose/base/angle.h"
+#include "pose/geometry/rigid3.h"
+
+namespace tbm {
+namespace {
+
+constexpr double kLeastRest_s = 2.0;
+constexpr double kWindow_s = 0.25;
+// A window whose mean is off by so many sigma of a mean, or whose spread is so many times the
+// unit's, is no rest.
+constexpr double kMostMeanSigmas = 7.0;
+constexpr double kMostSpread = 2.0;
+constexpr double kMostForceOff_m_s2 = 0.02;
+constexpr double kLeastQuiet_s = 1.0;
+constexpr std::size_t kStartImages = 5;
+// Of the noise of the other axes.
+constexpr double kFrozen = 1e-6;
+
+struct Mean {
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();
+  Eigen::Vector3d gyro_sigma = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_sigma = Eigen::Vector3d::Zero();
+};
+
+Mean MeanOf(const std::vector<ImuSample>& imu, std::size_t begin, std::size_t end) {
+  Mean mean;
+  const double count = static_cast<double>(end - begin);
+  for (std::size_t i = begin; i < end; ++i) {
+    mean.gyro += imu[i].gyro_rad_s / count;
+    mean.accel += imu[i].accel_m_s2 / count;
+  }
+  for (std::size_t i = begin; i < end; ++i) {
+    mean.gyro_sigma += (imu[i].gyro_rad_s - mean.gyro).cwiseAbs2() / count;
+    mean.accel_sigma += (imu[i].accel_m_s2 - mean.accel).cwiseAbs2() / count;
+  }
+  mean.gyro_sigma = mean.gyro_sigma.cwiseSqrt();
+  mean.accel_sigma = mean.accel_sigma.cwiseSqrt();
+  return mean;
+}
+
+bool IsNear(const Eigen::Vector3d& mean,
+            const Eigen::Vector3d& rest_mean,
+            const Eigen::Vector3d& rest_sigma,
+            double samples) {
+  const Eigen::Array3d limit = kMostMeanSigmas * rest_sigma.array() / std::sqrt(samples);
+  return ((mean - rest_mean).array().abs() <= limit).all();
+}
+
+// Whether a window shows no more than the unit's noise, and no rate but its bias.
+bool IsQuiet(const Mean& window, const RestSignature& rest, double samples) {
+  const bool is_even =
+      (window.gyro_sigma.array() <= kMostSpread * rest.sigma_gyro_rad_s.array()).all() &&
+      (window.accel_sigma.array() <= kMostSpread * rest.sigma_accel_m_s2.array()).all();
+  return is_even && IsNear(window.gyro, rest.mean_gyro_rad_s, rest.sigma_gyro_rad_s, samples);
+}
+
+// Where the rail is canted the axes feel gravity otherwise, but no more and no less of it, but for
+// what their biases change.
+bool FeelsGravityAlone(const Mean& window, const RestSignature& rest) {
+  return std::abs(window.accel.norm() - rest.mean_accel_m_s2.norm()) < kMostForceOff_m_s2;
+}
+
+std::size_t WindowSamples(const RailSetup& setup) {
+  return std::max<std::size_t>(8, static_cast<std::size_t>(kWindow_s * setup.imu.rate_hz));
+}
+
+Timestamp BeginOf(const ImuSample& sample) {
+  return sample.ends_at - Duration(static_cast<std::int64_t>(sample.interval_s * 1e9));
+}
+
+// How far from where they should be the targets of the first images lie when the unit's heading is
+// this [px], each at most `cap_px`, on average. All of one image at rest are as good as another's.
+double MeanOff(const RailSetup& setup,
+               const RailRecording& recording,
+               const Eigen::Quaterniond& world_from_imu,
+               double cap_px) {
+  const RailCamera& camera = *setup.camera;
+  const Eigen::Quaterniond camera_from_world = camera.camera_from_imu * world_from_imu.conjugate();
+  const Eigen::Vector3d camera_in_world =
+      setup.start.position_world_m + world_from_imu * camera.in_imu_m;
+  double sum = 0.0;
+  double count = 0.0;
+  std::size_t images = 0;
+  for (const TargetImage& image : recording.images) {
+    if (images++ == kStartImages) break;
+    for (const TargetPixel& pixel : image.pixels) {
+      const Eigen::Vector3d in_camera =
+          camera_from_world *
+          (recording.targets[static_cast<std::size_t>(pixel.target)].in_world_m - camera_in_world);
+      const auto projection = Project(camera.model, in_camera);
+      const double off = projection ? (projection->pixel_px - pixel.pixel_px).norm() : cap_px;
+      sum += std::min(off, cap_px);
+      count += 1.0;
+    }
+  }
+  return count > 0.0 ? sum / count : cap_px;
+}
+
+}  // namespace
+
+Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup,
+                                                          const RailRecording& recording) {
+  const std::vector<ImuSample>& imu = recording.imu;
+  if (imu.size() < static_cast<std::size_t>(setup.imu.rate_hz)) {
+    return Failure{RailStartFailure{RailStartFault::kNoImu, 0.0}};
+  }
+  if (setup.start.at_rest_s < kLeastRest_s) {
+    return Failure{RailStartFailure{RailStartFault::kNoRest, 0.0}};
+  }
+  const Timestamp begin = BeginOf(imu.front());
+  std::size_t end = 0;
+  while (end < imu.size() && SecondsBetween(begin, imu[end].ends_at) <= setup.start.at_rest_s) {
+    ++end;
+  }
+  // The first second alone says what rest looks like: later ones are held against it.
+  const auto first_second = std::min(end, static_cast<std::size_t>(setup.imu.rate_hz));
+  const Mean first = MeanOf(imu, 0, first_second);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (first.gyro_sigma[axis] <= kFrozen * first.gyro_sigma.maxCoeff()) {
+      return Failure{RailStartFailure{RailStartFault::kFrozen, static_cast<double>(axis)}};
+    }
+    if (first.accel_sigma[axis] <= kFrozen * first.accel_sigma.maxCoeff()) {
+      return Failure{RailStartFailure{RailStartFault::kFrozen, 3.0 + axis}};
+    }
+  }
+  const double expected = setup.imu.noise.angle_random_walk_rad * std::sqrt(setup.imu.rate_hz);
+  const double gravity = first.accel.norm();
+  const bool is_wrong_rate = first.gyro_sigma.minCoeff() > 20.0 * expected;
+  const bool is_wrong_force = std::abs(gravity / setup.gravity_m_s2 - 1.0) > 0.1;
+  RestSignature signature{first.gyro, first.accel, first.gyro_sigma, first.accel_sigma};
+  const std::size_t window = WindowSamples(setup);
+  for (std::size_t at = 0; at + window <= end; at += window) {
+    const Mean mean = MeanOf(imu, at, at + window);
+    const auto samples = static_cast<double>(window);
+    if (IsQuiet(mean, signature, samples) &&
+        IsNear(mean.accel, signature.mean_accel_m_s2, signature.sigma_accel_m_s2, samples)) {
+      continue;
+    }
+    return Failure{
+        RailStartFailure{RailStartFault::kMovesAtStart, SecondsBetween(begin, imu[at].ends_at)}};
+  }
+  if (is_wrong_rate || is_wrong_force) {
+    return Failure{RailStartFailure{
+        RailStartFault::kDegreesAsRadians,
+        is_wrong_rate ? first.gyro_sigma.minCoeff() / expected : gravity / setup.gravity_m_s2}};
+  }
+  const Mean all = MeanOf(imu, 0, end);
+  return RestSignature{all.gyro, all.accel, all.gyro_sigma, all.accel_sigma};
+}
+
+Result<Eigen::Quaterniond, RailStartFailure> FindStartAttitude(const RailSetup& setup,
+                                                               const RailRecording& recording,
+                                                               const RestSignature& rest) {
+  Eigen::Vector3d up_in_imu = rest.mean_accel_m_s2.normalized();
+  if (setup.tilt && !recording.tilts.empty()) {
+    const Timestamp begin = BeginOf(recording.imu.front());
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const TiltSample& tilt : recording.tilts) {
+      if (SecondsBetween(begin, tilt.sensed_at) > setup.start.at_rest_s) break;
+      const double x = -std::sin(tilt.angles.beta_rad);
+      const double y = std::sin(tilt.angles.gamma_rad);
+      sum += Eigen::Vector3d(x, y, std::sqrt(std::max(0.0, 1.0 - x * x - y * y)));
+    }
+    if (sum.norm() > 0.5) up_in_imu = setup.tilt->housing_from_imu.conjugate() * sum.normalized();
+  }
+  const Eigen::Quaterniond level = TurnBetween(up_in_imu, Eigen::Vector3d::UnitZ());
+  const auto headed = [&](double turn_rad) { return ExpRotation({0.0, 0.0, turn_rad}) * level; };
+  if (setup.start.heading_rad) {
+    const Eigen::Vector3d x = level * Eigen::Vector3d::UnitX();
+    return headed(*setup.start.heading_rad - std::atan2(x.y(), x.x()));
+  }
+  if (!setup.camera || recording.images.empty()) {
+    return Failure{RailStartFailure{RailStartFault::kNoHeading, 0.0}};
+  }
+  // Coarse to fine; the cap keeps the worst of a wrong match the same wherever one looks.
+  double best_rad = 0.0;
+  double span_rad = std::numbers::pi;
+  double step_rad = DegToRad(1.0);
+  double cap_px = 0.25 * setup.camera->model.fx_px;
+  double least = std::numeric_limits<double>::infinity();
+  while (step_rad > 1e-6) {
+    least = std::numeric_limits<double>::infinity();
+    const double centre_rad = best_rad;
+    for (double turn = centre_rad - span_rad; turn <= centre_rad + span_rad; turn += step_rad) {
+      const double off = MeanOff(setup, recording, headed(turn), cap_px);
+      if (off >= least) continue;
+      least = off;
+      best_rad = turn;
+    }
+    span_rad = 2.0 * step_rad;
+    step_rad *= 0.1;
+    cap_px = std::max(10.0, 0.3 * cap_px);
+  }
+  // Far off everywhere: these are other targets, or it stands elsewhere.
+  least = MeanOff(setup, recording, headed(best_rad), 0.25 * setup.camera->model.fx_px);
+  if (least > 0.02 * setup.camera->model.fx_px) {
+    return Failure{RailStartFailure{RailStartFault::kNoHeading, least}};
+  }
+  return headed(best_rad);
+}
+
+std::vector<RestSpan> FindQuietSpans(const RailSetup& setup,
+                                     const RailRecording& recording,
+                                     const RestSignature& rest) {
+  const std::vector<ImuSample>& imu = recording.imu;
+  const std::size_t window = WindowSamples(setup);
+  std::vector<RestSpan> spans;
+  std::size_t begin = 0;
+  bool is_in = false;
+  const auto close = [&](std::size_t end) {
+    is_in = false;
+    // Its first and last window may hold the end or the begin of the motion.
+    if (end < begin + 3 * window) return;
+    const RestSpan span{imu[begin + window].ends_at, imu[end - window].ends_at};
+    if (SecondsBetween(span.begins_at, span.ends_at) >= kLeastQuiet_s - 2.0 * kWindow_s) {
+      spans.push_back(span);
+    }
+  };
+  std::size_t at = 0;
+  for (; at + window <= imu.size(); at += window) {
+    const Mean mean = MeanOf(imu, at, at + window);
+    const bool is_quiet =
+        IsQuiet(mean, rest, static_cast<double>(window)) && FeelsGravityAlone(mean, rest);
+    if (is_quiet && !is_in) {
+      begin = at;
+      is_in = true;
+    }
+    if (!is_quiet && is_in) close(at);
+  }
+  if (is_in) close(at);
+  return spans;
+}
+
+}  // namespace tbm

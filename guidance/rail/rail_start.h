@@ -1,0 +1,55 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "guidance/rail/rail_recording.h"
+#include "pose/base/result.h"
+
+namespace tbm {
+
+// A span of time in which the unit stood still.
+struct RestSpan {
+  Timestamp begins_at;
+  Timestamp ends_at;
+};
+
+// What the unit shows while it certainly rests: the mean and the spread of its samples.
+struct RestSignature {
+  Eigen::Vector3d mean_gyro_rad_s = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_accel_m_s2 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sigma_gyro_rad_s = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sigma_accel_m_s2 = Eigen::Vector3d::Zero();
+};
+
+enum class RailStartFault {
+  kNoImu,             // fewer than a second of samples
+  kNoRest,            // start.at_rest_s is less than two seconds
+  kMovesAtStart,      // the unit moves while it is said to rest
+  kDegreesAsRadians,  // rates or forces are in another unit
+  kFrozen,            // an axis shows one and the same number
+  kNoHeading,         // neither given nor seen by the camera
+};
+
+struct RailStartFailure {
+  RailStartFault fault = RailStartFault::kNoImu;
+  double at_s = 0.0;  // kMovesAtStart: since the first sample; kFrozen: number of the axis, 0..5
+};
+
+// The signature of the rest at the start, or what is wrong with it.
+Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup,
+                                                          const RailRecording& recording);
+
+// The attitude at the start: level by the inclinometer (or the accelerometers), heading as given or
+// turned until the first images' targets lie where they should.
+Result<Eigen::Quaterniond, RailStartFailure> FindStartAttitude(const RailSetup& setup,
+                                                               const RailRecording& recording,
+                                                               const RestSignature& rest);
+
+// Later spans of at least a second in which the unit shows nothing but its noise. That is rest, or
+// an even motion on an even rail: the filter decides (UpdateByRest).
+std::vector<RestSpan> FindQuietSpans(const RailSetup& setup,
+                                     const RailRecording& recording,
+                                     const RestSignature& rest);
+
+}  // namespace tbm

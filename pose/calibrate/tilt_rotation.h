@@ -1,0 +1,73 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include <Eigen/Core>
+
+#include "pose/base/result.h"
+
+namespace tbm {
+
+// One placement of a rig that carries a camera and an inclinometer (or a resting accelerometer)
+// before a board that does not move.
+struct TiltPlacement {
+  Eigen::Matrix3d camera_from_board = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d up_in_housing = Eigen::Vector3d::UnitZ();  // unit vector, from the two angles
+  double camera_sigma_rad = 0.0;                             // of camera_from_board, each axis, > 0
+  double tilt_sigma_rad = 0.0;                               // of each of the two angles, > 0
+};
+
+// How the housing is built to the camera.
+struct TiltRotation {
+  Eigen::Matrix3d camera_from_housing = Eigen::Matrix3d::Identity();
+  // Of the turn e, about the camera's axes [rad2]: R_true = Exp(e) R.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d up_in_board = Eigen::Vector3d::UnitZ();
+  double up_sigma_rad = 0.0;  // along its worse direction; 0 where it was given
+  double chi2 = 0.0;          // of 2 n residuals
+  int dof = 0;
+  int steps = 0;  // of the augmented Lagrangian; 0 where there was none
+};
+
+enum class TiltRotationFault {
+  kTooFew,     // under four placements, or under two where up is given
+  kNoTilt,     // the housing stood the same way in all of them: only turned about the plumb line
+  kOneAxis,    // it was tilted about one axis only
+  kNoYaw,      // it was hardly turned about the plumb line
+  kTooWeak,    // sigma would be above what was allowed, and none of the above is the reason
+  kNoRotation  // no rotation fits: two placements exchanged, or the board moved
+};
+// What is missing, for the person at the rig: "tilt it about the other axis as well".
+const char* MissingMotion(TiltRotationFault fault);
+
+struct TiltRotationFailure {
+  TiltRotationFault fault = TiltRotationFault::kTooFew;
+  double sigma_rad = 0.0;  // what it would have been; NaN where that is not known
+};
+
+struct TiltRotationOptions {
+  // Up in the board's frame where it is known: the board was plumbed, or an inclinometer stood on
+  // it. Unit vector; with its sigma.
+  std::optional<Eigen::Vector3d> up_in_board;
+  double up_sigma_rad = 0.0;
+  double most_sigma_rad = 0.0035;  // 0.2 degree
+};
+
+// Rotation between inclinometer and camera (rail-line paper, Eqs. 4 to 15: camera_j = C_ij taken to
+// camera_i, all pairs): smallest singular vector as the start, augmented Lagrangian with closed
+// steps, then Gauss-Newton on rotation and up together, which has the covariance. With up given the
+// start is one singular value decomposition.
+Result<TiltRotation, TiltRotationFailure> FindTiltRotation(
+    std::span<const TiltPlacement> placements, const TiltRotationOptions& options);
+
+// The parts, for tests and comparison. `Start...`: the rotation next to the null vector of the
+// paper's A. `AugmentedLagrangian`: from any start; `steps` counts.
+Eigen::Matrix3d StartTiltRotation(std::span<const TiltPlacement> placements);
+Eigen::Matrix3d AugmentedLagrangianTiltRotation(std::span<const TiltPlacement> placements,
+                                                const Eigen::Matrix3d& start,
+                                                int* steps);
+Eigen::Matrix3d KnownUpTiltRotation(std::span<const TiltPlacement> placements,
+                                    const Eigen::Vector3d& up_in_board);
+
+}  // namespace tbm
