@@ -105,7 +105,6 @@ TEST(CounterClock, CountsOnOverLostDatagramsAlsoMoreThanOnceRound) {
   for (const int lost : {1, 5, 31, 62, 63, 64, 100, 140}) {
     CounterClock clock({});
     const Crystal crystal;
-    std::optional<CountedTime> before;
     for (int i = 0; i < 600; ++i) {
       const int sample = i < 500 ? i : i + lost;
       const double delay_s = i % 7 * 1e-3;
