@@ -1,6 +1,7 @@
 #include "guidance/app/line_command.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <map>
@@ -161,6 +162,9 @@ std::string Summary(const RailLine& line, const RailRun& run) {
   return text;
 }
 
+constexpr std::array<std::string_view, 6> kImuAxes = {
+    "gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s", "accel_x_m_s2", "accel_y_m_s2", "accel_z_m_s2"};
+
 std::string Explain(const RailStartFailure& failure, const RailRun& run) {
   switch (failure.fault) {
     case RailStartFault::kNoImu:
@@ -173,28 +177,34 @@ std::string Explain(const RailStartFailure& failure, const RailRun& run) {
           "start.at_rest_s: {}; give the time it really rested",
           failure.at_s,
           run.setup.start.at_rest_s);
-    case RailStartFault::kDegreesAsRadians:
-      return failure.at_s > 20.0
-                 ? fmt::format(
-                       "imu.csv: the gyros' noise at rest is {:.0f} times what "
-                       "imu.angle_random_walk_deg_sqrt_h says: are these degrees per second "
-                       "where radians per second belong?",
-                       failure.at_s)
-                 : fmt::format(
-                       "imu.csv: at rest the accelerometers show {:.3f} times gravity: m/s2 belong "
-                       "there, not g or mg",
-                       failure.at_s);
+    case RailStartFault::kWrongRateUnit:
+      return fmt::format(
+          "imu.csv: the gyros' noise at rest is {:.0f} times what imu.angle_random_walk_deg_sqrt_h "
+          "says: are these degrees per second where radians per second belong?",
+          failure.times);
+    case RailStartFault::kWrongForce:
+      return fmt::format(
+          "imu.csv: at rest the accelerometers show {:.3f} times gravity: m/s2 belong there, not g "
+          "or mg",
+          failure.times);
+    case RailStartFault::kBiasTooLarge:
+      return fmt::format(
+          "imu.csv: {} shows at rest {:.0f} times what imu.gyro_bias_deg_h and the turning of the "
+          "Earth allow",
+          kImuAxes[static_cast<std::size_t>(failure.axis)],
+          failure.times);
     case RailStartFault::kFrozen:
-      return fmt::format("imu.csv: axis {} shows one and the same number", failure.at_s);
+      return fmt::format("imu.csv: {} shows one and the same number",
+                         kImuAxes[static_cast<std::size_t>(failure.axis)]);
     case RailStartFault::kNoHeading:
-      return failure.at_s > 0.0
-                 ? fmt::format(
-                       "centres.csv: whatever the heading, the targets lie {:.0f} px from "
-                       "where start.position_m and targets.csv put them: names exchanged, "
-                       "another place, or another camera",
-                       failure.at_s)
-                 : "rail.yaml: the heading is not known and no target is seen: give "
-                   "start.heading_deg and heading_known: true";
+      return "rail.yaml: the heading is not known and no target is seen: give start.heading_deg, "
+             "sigma_heading_deg and heading_known: true";
+    case RailStartFault::kNoTargetFits:
+      return fmt::format(
+          "centres.csv: whatever the heading, the targets lie {:.0f} px from where "
+          "start.position_m and targets.csv put them: names exchanged, another place, or another "
+          "camera",
+          failure.off_px);
   }
   return "";
 }

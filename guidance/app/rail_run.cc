@@ -55,6 +55,7 @@ class RailRunLoader {
     LoadCentres();
     LoadOdometer();
     LoadTruth();
+    WarnOfUnused();
     if (!faults_.empty()) return Failure{std::move(faults_)};
     return std::move(run_);
   }
@@ -352,6 +353,28 @@ class RailRunLoader {
       truth.position_world_m = {v[0], v[1], v[2]};
       truth.world_from_imu = Eigen::Quaterniond(v[3], v[4], v[5], v[6]).normalized();
       run_.truth.push_back(truth);
+    }
+  }
+
+  // Nothing is passed over in silence.
+  void WarnOfUnused() {
+    const auto unused = [&](std::string_view file, std::string_view why) {
+      run_.warnings.push_back(fmt::format("{}: is not used: {}", PathOf(file), why));
+    };
+    const RailSetup& setup = run_.setup;
+    if (!run_.recording.tilts.empty() && !setup.tilt) {
+      unused("tilt.csv", "rail.yaml has no section tilt");
+    }
+    if (!run_.recording.images.empty() && !setup.camera) {
+      unused("centres.csv", "rail.yaml has no section camera");
+    }
+    if (!run_.recording.odometer.empty() && !setup.odometer) {
+      unused("odometer.csv", "rail.yaml has no section odometer");
+    }
+    if (Has("frames.csv")) unused("frames.csv", "image points come from centres.csv");
+    if (setup.camera && run_.recording.images.empty()) {
+      run_.warnings.push_back(PathOf("centres.csv") +
+                              ": there is no image point: no target is seen on this run");
     }
   }
 

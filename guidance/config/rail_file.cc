@@ -95,6 +95,29 @@ std::optional<RailCamera> ReadCamera(const YamlNode& node) {
   return camera;
 }
 
+std::optional<RailOdometer> ReadOdometer(const YamlNode& node) {
+  if (!IsSection(node)) return {};
+  YamlSection keys(node);
+  RailOdometer odometer;
+  OdometerMounting& mounting = odometer.mounting;
+  const auto rotation = RotationOf(keys.Require(
+      "rotation", "nine numbers, row by row, imu frame into vehicle: x along the rail, z up"));
+  if (rotation) mounting.vehicle_from_imu = Eigen::Quaterniond(*rotation);
+  const auto position = keys.Require("position_m", "[x, y, z] of the wheel in the imu frame")
+                            .Numbers(3, {-100.0, 100.0, "m"});
+  if (position) mounting.wheel_in_imu_m = {(*position)[0], (*position)[1], (*position)[2]};
+  const auto sigma_mm =
+      keys.Require("sigma_mm", "of one reading, e.g. 0.5").Number({0.0, 1000.0, "mm", true});
+  odometer.sigma_m = 1e-3 * sigma_mm.value_or(1.0);
+  keys.Scaled("sigma_scale_ppm", 0.0, 1e5, "ppm", 1e6, &odometer.sigma_scale);
+  const auto side_mm_s =
+      keys.Require("sigma_side_mm_s", "how fast the wheel may leave the rail's direction, e.g. 5")
+          .Number({0.0, 1e4, "mm/s", true});
+  mounting.sigma_side_m_s = 1e-3 * side_mm_s.value_or(1.0);
+  keys.RefuseOthers();
+  return odometer;
+}
+
 void ReadStart(const YamlNode& node, RailStart* start) {
   if (!node.IsMap()) {
     if (node.exists()) node.Fault("must be a map {position_m: [x, y, z], at_rest_s: 10, ..}");
@@ -111,23 +134,31 @@ void ReadStart(const YamlNode& node, RailStart* start) {
   start->at_rest_s = at_rest_s.value_or(2.0);
   bool heading_known = false;
   keys.Flag("heading_known", &heading_known);
-  double heading_deg = 0.0;
   const YamlNode heading = keys.Know("heading_deg");
-  if (heading.exists()) {
-    heading_deg = heading.Number({-360.0, 360.0, "deg"}).value_or(0.0);
-  } else if (heading_known) {
+  const YamlNode sigma = keys.Know("sigma_heading_deg");
+  const auto heading_deg = heading.exists() ? heading.Number({-360.0, 360.0, "deg"}) : std::nullopt;
+  const auto sigma_deg = sigma.exists() ? sigma.Number({0.0, 180.0, "deg", true}) : std::nullopt;
+  if (heading_known && !heading.exists()) {
     node.Fault(
         "says heading_known: true, and there is no heading_deg (of the unit's x in the "
         "world, from x towards y)");
   }
-  if (heading_known) start->heading_rad = DegToRad(heading_deg);
+  if (heading_known && !sigma.exists()) {
+    node.Fault(
+        "says heading_known: true, and there is no sigma_heading_deg: how well it is known, e.g. "
+        "0.05");
+  }
+  if (heading_known) {
+    start->heading_rad = DegToRad(heading_deg.value_or(0.0));
+    start->sigma_heading_rad = DegToRad(sigma_deg.value_or(1.0));
+  }
   keys.RefuseOthers();
 }
 
 RailSetup Read(const YamlNode& root) {
   RailSetup setup;
   if (!root.IsMap()) {
-    root.Fault("is not a map with gravity_m_s2, imu, tilt, camera and start");
+    root.Fault("is not a map with gravity_m_s2, imu, tilt, camera, odometer and start");
     return setup;
   }
   YamlSection keys(root);
@@ -135,6 +166,7 @@ RailSetup Read(const YamlNode& root) {
   ReadImu(keys.Require("imu", "rate and noise of the inertial unit"), &setup.imu);
   setup.tilt = ReadTilt(keys.Know("tilt"));
   setup.camera = ReadCamera(keys.Know("camera"));
+  setup.odometer = ReadOdometer(keys.Know("odometer"));
   ReadStart(keys.Require("start", "where the run begins and how long it rests"), &setup.start);
   keys.RefuseOthers();
   return setup;

@@ -69,7 +69,7 @@ FusionFilter::FusionFilter(const FusionLayout& layout,
   TBM_CHECK(covariance.rows() == layout.size() && covariance.cols() == layout.size());
 }
 
-void FusionFilter::Feed(const ImuSample& sample, double noise_scale) {
+void FusionFilter::Feed(const ImuSample& sample, const ImuNoise& noise) {
   const double dt = sample.interval_s;
   const Increments increments = strapdown_.Next(
       sample.gyro_rad_s - state_.gyro_bias_rad_s, sample.accel_m_s2 - state_.accel_bias_m_s2, dt);
@@ -99,7 +99,7 @@ void FusionFilter::Feed(const ImuSample& sample, double noise_scale) {
       dt * q.middleCols<3>(kV) + 0.5 * dt * (q.middleCols<3>(kA) * lever.transpose());
   q.middleCols<3>(kV) += q.middleCols<3>(kA) * lever.transpose();
   q.middleCols<3>(kA) = (q.middleCols<3>(kA) * back.transpose()).eval();
-  AddNoise(dt, noise_scale);
+  AddNoise(dt, noise);
 
   state_.motion = Advanced(state_.motion, increments, dt, GravityInWorld(state_, gravity_m_s2_));
   last_ = sample;
@@ -115,9 +115,9 @@ void FusionFilter::Hold(const ImuSample& sample) {
   now_ = sample.ends_at;
 }
 
-void FusionFilter::AddNoise(double interval_s, double scale) {
-  const double angle = scale * noise_.angle_random_walk_rad;
-  const double velocity = scale * noise_.velocity_random_walk_m_s;
+void FusionFilter::AddNoise(double interval_s, const ImuNoise& noise) {
+  const double angle = noise.angle_random_walk_rad;
+  const double velocity = noise.velocity_random_walk_m_s;
   const double velocity_variance = velocity * velocity * interval_s;
   for (int i = 0; i < 3; ++i) {
     step_noise_(kA + i, kA + i) += angle * angle * interval_s;

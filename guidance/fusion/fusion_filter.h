@@ -71,9 +71,10 @@ class FusionFilter {
                double gravity_m_s2,
                Timestamp now);
 
-  // Integrates a sample whose interval begins where the last one ended. `noise_scale` > 1 where it
-  // stands for samples that are missing.
-  void Feed(const ImuSample& sample, double noise_scale = 1.0);
+  // Integrates a sample whose interval begins where the last one ended. `noise`: where it stands
+  // for samples that are missing, what may have happened meanwhile.
+  void Feed(const ImuSample& sample) { Feed(sample, noise_); }
+  void Feed(const ImuSample& sample, const ImuNoise& noise);
 
   // The same for a sample during which the unit is known to rest: nothing moves, and what gyros and
   // accelerometers show is their biases, gravity and noise. UpdateByRest takes it from there.
@@ -111,7 +112,7 @@ class FusionFilter {
   const FusionStep& last_step() const { return last_step_; }
 
  private:
-  void AddNoise(double interval_s, double scale);
+  void AddNoise(double interval_s, const ImuNoise& noise);
 
   const FusionLayout layout_;
   const ImuNoise noise_;

@@ -103,8 +103,8 @@ Result<RailLine, RailStartFailure> SolveInertialLine(const RailSetup& setup,
   Eigen::Vector3d position_m = setup.start.position_world_m;
   double distance_m = 0.0;
   double open_s = 0.0;  // since the last rest
-  // What the rest could tell of the accelerometers: its noise over its length, and level, which
-  // stands for the lean of gravity.
+  // What the rest could tell of the biases: its noise over its length. An error of the gyros' leans
+  // gravity, and so does their noise.
   const double velocity_walk = setup.imu.noise.velocity_random_walk_m_s;
   const double rest_s = setup.start.at_rest_s;
   const double bias_m_s2 = velocity_walk / std::sqrt(rest_s);
@@ -128,8 +128,9 @@ Result<RailLine, RailStartFailure> SolveInertialLine(const RailSetup& setup,
     const double noise_m = velocity_walk * std::sqrt(open_s * open_s * open_s / 3.0);
     const double drift_m = 0.5 * bias_m_s2 * open_s * open_s;
     const double lean_m = lean_m_s3 * std::sqrt(std::pow(open_s, 5) / 20.0);
+    const double turn_m = lean_m_s3 / std::sqrt(rest_s) * std::pow(open_s, 3) / 6.0;
     point.sigma_world_m.setConstant(
-        std::hypot(std::hypot(held_m, noise_m), std::hypot(drift_m, lean_m)));
+        std::hypot(std::hypot(held_m, noise_m), std::hypot(drift_m, lean_m, turn_m)));
     point.status = rows[i].rests ? RailStatus::kFixed : RailStatus::kOpen;
   }
   return line;

@@ -6,10 +6,10 @@ namespace tbm {
 
 // The line as the patent has it (CN106052584, steps 2 and 3), for comparison: attitude by a
 // fourth-order Runge-Kutta step of the quaternion, acceleration turned into the world and
-// integrated twice; the biases are those of the rest at the start. Where the trolley rests again
-// its velocity is known to be none: what the integration has gathered by then is taken out in equal
-// parts. Between rests nothing holds it: sigma is the growth of the unit's noise and of what its
-// rest could tell of the biases.
+// integrated twice; the biases are those of the rest at the start. Its compensation by image
+// displacement is not in it. Where the trolley rests again its velocity is known to be none: what
+// the integration has gathered by then is taken out in equal parts. Between rests nothing holds it:
+// sigma is the growth of the unit's noise and of what its rest could tell of the biases.
 Result<RailLine, RailStartFailure> SolveInertialLine(const RailSetup& setup,
                                                      const RailRecording& recording);
 

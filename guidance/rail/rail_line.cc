@@ -18,18 +18,28 @@ namespace {
 constexpr Duration kLongestEpoch = std::chrono::milliseconds(100);
 // A sample that ends later than one and a half periods after the one before leaves a gap.
 constexpr double kGapPeriods = 1.5;
-// What stands for missing samples is so many times as uncertain.
-constexpr double kGapNoise = 300.0;
+// What may have happened while samples are missing.
+constexpr double kGapForce_m_s2 = 0.5;
+constexpr double kGapRate_rad_s = 0.05;
 constexpr double kHeld_s = 1.0;
 constexpr double kStill_m_s = 0.003;
-constexpr double kStartAttitude_rad = 2e-3;
+// How well the start is known before the filter begins: so badly that the same readings, when the
+// filter takes them, are not counted twice.
+constexpr double kStartLevel_rad = 2e-3;
 constexpr double kStartHeading_rad = 5e-3;
 constexpr double kStartVelocity_m_s = 1e-3;
 // The state is no better for it than it was.
 constexpr double kToldNothing = 0.9;
 
-const std::vector<FusionOption> kCameraOptions = {
-    FusionOption::kTimeOffset, FusionOption::kCameraRotation, FusionOption::kCameraPosition};
+std::vector<FusionOption> OptionsOf(const RailSetup& setup) {
+  std::vector<FusionOption> options;
+  if (setup.camera) {
+    options = {
+        FusionOption::kTimeOffset, FusionOption::kCameraRotation, FusionOption::kCameraPosition};
+  }
+  if (setup.odometer) options.push_back(FusionOption::kOdometerScale);
+  return options;
+}
 
 struct Prior {
   FusionLayout layout;
@@ -37,20 +47,17 @@ struct Prior {
   FusionMatrix covariance;
 };
 
-Prior MakePrior(const RailSetup& setup,
-                const Eigen::Quaterniond& world_from_imu,
-                const RestSignature& rest,
-                int modes) {
+Prior MakePrior(const RailSetup& setup, const Eigen::Quaterniond& world_from_imu, int modes) {
   Prior prior;
-  prior.layout = FusionLayout(setup.camera ? kCameraOptions : std::vector<FusionOption>{}, modes);
+  prior.layout = FusionLayout(OptionsOf(setup), modes);
   FusionState& state = prior.state;
   state.motion.position_world_m = setup.start.position_world_m;
   state.motion.world_from_imu = world_from_imu;
-  state.gyro_bias_rad_s = rest.mean_gyro_rad_s;
   FusionVector sigma = FusionVector::Zero(prior.layout.size());
   sigma.segment<3>(FusionLayout::kPosition).setConstant(setup.start.sigma_position_m);
   sigma.segment<3>(FusionLayout::kVelocity).setConstant(kStartVelocity_m_s);
-  sigma.segment<3>(FusionLayout::kGyroBias).setConstant(setup.imu.gyro_bias_sigma_rad_s);
+  sigma.segment<3>(FusionLayout::kGyroBias)
+      .setConstant(std::hypot(setup.imu.gyro_bias_sigma_rad_s, kEarthRate_rad_s));
   sigma.segment<3>(FusionLayout::kAccelBias).setConstant(setup.imu.accel_bias_sigma_m_s2);
   if (setup.camera) {
     const RailCamera& camera = *setup.camera;
@@ -63,6 +70,9 @@ Prior MakePrior(const RailSetup& setup,
     sigma.segment<3>(prior.layout.At(FusionOption::kCameraPosition))
         .setConstant(camera.sigma_position_m);
   }
+  if (setup.odometer) {
+    sigma[prior.layout.At(FusionOption::kOdometerScale)] = setup.odometer->sigma_scale;
+  }
   state.modes.setZero(modes);
   if (modes > 0) sigma.tail(modes).setOnes();
   // What is exactly known is known to a millionth of what matters.
@@ -70,8 +80,14 @@ Prior MakePrior(const RailSetup& setup,
   prior.covariance = sigma.cwiseAbs2().asDiagonal();
   // Level is known better than heading; both about the axes of the world.
   const Eigen::Matrix3d imu_from_world = world_from_imu.conjugate().toRotationMatrix();
-  const double heading_rad = setup.start.heading_rad ? kStartAttitude_rad : kStartHeading_rad;
-  const Eigen::Vector3d attitude(kStartAttitude_rad, kStartAttitude_rad, heading_rad);
+  const double level_rad =
+      setup.tilt
+          ? kStartLevel_rad
+          : std::hypot(kStartLevel_rad, setup.imu.accel_bias_sigma_m_s2 / setup.gravity_m_s2);
+  const double seen_rad =
+      std::hypot(kStartHeading_rad, setup.camera ? setup.camera->sigma_rotation_rad : 0.0);
+  const double heading_rad = setup.start.heading_rad ? setup.start.sigma_heading_rad : seen_rad;
+  const Eigen::Vector3d attitude(level_rad, level_rad, heading_rad);
   prior.covariance.block<3, 3>(FusionLayout::kAttitude, FusionLayout::kAttitude) =
       imu_from_world * attitude.cwiseAbs2().asDiagonal() * imu_from_world.transpose();
   return prior;
@@ -106,10 +122,20 @@ class Run {
       const double span_s = SecondsBetween(filter_.now(), sample.ends_at);
       const bool is_gap = span_s > kGapPeriods / setup_.imu.rate_hz;
       if (is_gap) gaps_.push_back({filter_.now(), sample.ends_at});
-      while (NextStamp() < sample.ends_at) Advance(sample, NextStamp(), is_gap);
-      Advance(sample, sample.ends_at, is_gap);
+      gap_s_ = is_gap ? span_s : 0.0;
+      while (NextStamp() < sample.ends_at) Advance(sample, NextStamp());
+      Advance(sample, sample.ends_at);
     }
     if (smoother_.at(smoother_.size() - 1) < filter_.now()) EndEpoch();
+    for (; tilt_ < recording_.tilts.size(); ++tilt_) {
+      Outside(recording_.tilts[tilt_].sensed_at, FusionUpdate::kTilt);
+    }
+    for (; image_ < recording_.images.size(); ++image_) {
+      Outside(recording_.images[image_].stamped_at, FusionUpdate::kTargets);
+    }
+    for (; wheel_ < recording_.odometer.size(); ++wheel_) {
+      Outside(MiddleOf(wheel_), FusionUpdate::kOdometer);
+    }
   }
 
   const FusionSmoother& smoother() const { return smoother_; }
@@ -127,18 +153,31 @@ class Run {
     if (image_ < recording_.images.size()) {
       next = std::min(next, recording_.images[image_].stamped_at);
     }
+    if (wheel_ < recording_.odometer.size()) next = std::min(next, MiddleOf(wheel_));
     return next;
   }
 
-  void Advance(const ImuSample& sample, Timestamp to, bool is_gap) {
+  // Between two readings the wheel has run with its mean speed, as it had it half way.
+  Timestamp MiddleOf(std::size_t reading) const {
+    const Timestamp before = recording_.odometer[reading - 1].sensed_at;
+    return before + Duration((recording_.odometer[reading].sensed_at - before).count() / 2);
+  }
+
+  void Advance(const ImuSample& sample, Timestamp to) {
     if (to > filter_.now()) {
       ImuSample part = sample;
       part.interval_s = SecondsBetween(filter_.now(), to);
       part.ends_at = to;
-      if (rests_now_ && SaysRest(to)) {
+      if (gap_s_ > 0.0) {
+        // Also a trolley that rested may have been moved meanwhile.
+        ImuNoise unknown = setup_.imu.noise;
+        unknown.angle_random_walk_rad = kGapRate_rad_s * std::sqrt(gap_s_);
+        unknown.velocity_random_walk_m_s = kGapForce_m_s2 * std::sqrt(gap_s_);
+        filter_.Feed(part, unknown);
+      } else if (rests_now_ && SaysRest(to)) {
         filter_.Hold(part);
       } else {
-        filter_.Feed(part, is_gap ? kGapNoise : 1.0);
+        filter_.Feed(part);
       }
     }
     if (NextStamp() <= to) EndEpoch();
@@ -165,12 +204,20 @@ class Run {
     if (rests_now_) fixes_.push_back(now);
     while (tilt_ < recording_.tilts.size() && recording_.tilts[tilt_].sensed_at <= now) {
       const TiltSample& tilt = recording_.tilts[tilt_++];
-      if (!setup_.tilt || tilt.sensed_at < now || filter_.last_interval_s() <= 0.0) continue;
+      if (!setup_.tilt) continue;
+      if (tilt.sensed_at < now) {
+        Outside(tilt.sensed_at, FusionUpdate::kTilt);
+        continue;
+      }
       Count(UpdateByTilt(filter_, *setup_.tilt, tilt.angles, rests_now_));
     }
     while (image_ < recording_.images.size() && recording_.images[image_].stamped_at <= now) {
       const TargetImage& image = recording_.images[image_++];
-      if (!setup_.camera || image.stamped_at < now) continue;
+      if (!setup_.camera) continue;
+      if (image.stamped_at < now) {
+        Outside(image.stamped_at, FusionUpdate::kTargets);
+        continue;
+      }
       const TargetsVerdict outcome = UpdateByTargets(
           filter_, setup_.camera->model, setup_.camera->residual_px, targets_, image.pixels);
       Count(outcome.verdict);
@@ -181,7 +228,29 @@ class Run {
       }
       if (outcome.verdict.accepted) fixes_.push_back(now);
     }
+    while (wheel_ < recording_.odometer.size() && MiddleOf(wheel_) <= now) TakeWheel(wheel_++);
     smoother_.After(filter_);
+  }
+
+  void TakeWheel(std::size_t reading) {
+    if (!setup_.odometer) return;
+    const Timestamp at = MiddleOf(reading);
+    if (at < filter_.now()) return Outside(at, FusionUpdate::kOdometer);
+    const OdometerReading& from = recording_.odometer[reading - 1];
+    const OdometerReading& to = recording_.odometer[reading];
+    const double span_s = SecondsBetween(from.sensed_at, to.sensed_at);
+    OdometerMounting mounting = setup_.odometer->mounting;
+    mounting.sigma_m_s = std::sqrt(2.0) * setup_.odometer->sigma_m / span_s;
+    Count(UpdateByOdometer(filter_, mounting, (to.distance_m - from.distance_m) / span_s));
+  }
+
+  // Before the first sample or after the last.
+  void Outside(Timestamp at, FusionUpdate update) {
+    FusionVerdict verdict;
+    verdict.update = update;
+    verdict.sensed_at = at;
+    verdict.why_not = "outside_of_samples";
+    Count(verdict);
   }
 
   void Count(const FusionVerdict& verdict) {
@@ -206,8 +275,10 @@ class Run {
   FusionSmoother smoother_;
   RailLine* line_ = nullptr;
   bool rests_now_ = false;  // since the last epoch
+  double gap_s_ = 0.0;      // that the present sample stands for; 0: it is one like all
   std::size_t tilt_ = 0;
   std::size_t image_ = 0;
+  std::size_t wheel_ = 1;
   std::vector<RestSpan> gaps_;
   std::vector<Timestamp> fixes_;
 };
@@ -373,6 +444,12 @@ void FillEstimates(const FusionEpoch& last, const Prior& prior, RailLine* line) 
           "turning about two axes while targets are seen");
     }
   }
+  if (layout.Has(FusionOption::kOdometerScale)) {
+    add("odometer_scale",
+        layout.At(FusionOption::kOdometerScale),
+        state.odometer_scale,
+        "a stretch between targets, or between places that are known");
+  }
 }
 
 std::vector<TargetView> ViewsOf(const std::vector<Knot>& knots, const RailRecording& recording) {
@@ -423,7 +500,7 @@ Result<RailLine, RailStartFailure> SolveRailLine(const RailSetup& setup,
   TargetModes modes;
   if (setup.camera && !recording.images.empty()) {
     RailLine ignored;
-    Run first(setup, recording, targets, rests, MakePrior(setup, *attitude, *rest, 0));
+    Run first(setup, recording, targets, rests, MakePrior(setup, *attitude, 0));
     first.Go(&ignored);
     const auto views = ViewsOf(KnotsOf(first.smoother(), RailMethod::kSmoothed), recording);
     modes = FindTargetModes(
@@ -432,7 +509,7 @@ Result<RailLine, RailStartFailure> SolveRailLine(const RailSetup& setup,
   RailLine line;
   line.target_modes = static_cast<std::size_t>(modes.count);
   line.target_modes_left_out_m = modes.left_out_m;
-  const Prior prior = MakePrior(setup, *attitude, *rest, modes.count);
+  const Prior prior = MakePrior(setup, *attitude, modes.count);
   Run run(setup, recording, targets, rests, prior);
   run.Go(&line);
   const std::vector<Knot> knots = KnotsOf(run.smoother(), method);
@@ -448,6 +525,13 @@ Result<RailLine, RailStartFailure> SolveRailLine(const RailSetup& setup,
                   knots[k],
                   std::span(recording.imu).subspan(begin, end - begin),
                   &line.points);
+  }
+  // What the states do not hold of the survey's errors is the same all along the line.
+  for (RailPoint& point : line.points) {
+    point.sigma_world_m =
+        (point.sigma_world_m.cwiseAbs2().array() + modes.left_out_m * modes.left_out_m)
+            .sqrt()
+            .matrix();
   }
   FillDistance(knots, &line.points);
   FillStatus(run.fixes(), run.gaps(), method, &line.points);

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 
 #include "guidance/fusion/fusion_filter.h"
+#include "guidance/fusion/odometer_update.h"
 #include "guidance/fusion/target_pixels.h"
 #include "guidance/fusion/tilt_update.h"
 #include "pose/geometry/camera_model.h"
@@ -31,10 +32,16 @@ struct RailImu {
   double gyro_bias_sigma_rad_s = 0.0;
   double accel_bias_sigma_m_s2 = 0.0;
 };
+struct RailOdometer {
+  OdometerMounting mounting;  // its sigma_m_s follows from `sigma_m` and the time between readings
+  double sigma_m = 0.0;       // of one reading, > 0
+  double sigma_scale = 0.0;   // of true distance over told distance
+};
 struct RailStart {
   Eigen::Vector3d position_world_m = Eigen::Vector3d::Zero();  // of the unit
   double sigma_position_m = 0.0;
   std::optional<double> heading_rad;  // of the unit's x in the world, from x towards y
+  double sigma_heading_rad = 0.0;     // of it, > 0 where it is given
   double at_rest_s = 0.0;             // from the first sample on
 };
 struct RailSetup {
@@ -42,6 +49,7 @@ struct RailSetup {
   RailImu imu;
   std::optional<TiltMounting> tilt;
   std::optional<RailCamera> camera;
+  std::optional<RailOdometer> odometer;
   RailStart start;
 };
 
@@ -53,9 +61,10 @@ struct TargetImage {
   Timestamp stamped_at;  // by the camera's clock
   std::vector<TargetPixel> pixels;
 };
+
 struct OdometerReading {
   Timestamp sensed_at;
-  double distance_m = 0.0;  // since any beginning
+  double distance_m = 0.0;  // since any beginning, forwards positive
 };
 
 // One run, each list in the order of time.

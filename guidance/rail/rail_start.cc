@@ -23,6 +23,10 @@ constexpr double kLeastQuiet_s = 1.0;
 constexpr std::size_t kStartImages = 5;
 // Of the noise of the other axes.
 constexpr double kFrozen = 1e-6;
+// A gyro's bias over its sigma.
+constexpr double kMostBias = 8.0;
+
+Failure<RailStartFailure> Fail(const RailStartFailure& failure) { return {failure}; }
 
 struct Mean {
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
@@ -111,10 +115,10 @@ Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup
                                                           const RailRecording& recording) {
   const std::vector<ImuSample>& imu = recording.imu;
   if (imu.size() < static_cast<std::size_t>(setup.imu.rate_hz)) {
-    return Failure{RailStartFailure{RailStartFault::kNoImu, 0.0}};
+    return Fail({.fault = RailStartFault::kNoImu});
   }
   if (setup.start.at_rest_s < kLeastRest_s) {
-    return Failure{RailStartFailure{RailStartFault::kNoRest, 0.0}};
+    return Fail({.fault = RailStartFault::kNoRest});
   }
   const Timestamp begin = BeginOf(imu.front());
   std::size_t end = 0;
@@ -126,10 +130,10 @@ Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup
   const Mean first = MeanOf(imu, 0, first_second);
   for (int axis = 0; axis < 3; ++axis) {
     if (first.gyro_sigma[axis] <= kFrozen * first.gyro_sigma.maxCoeff()) {
-      return Failure{RailStartFailure{RailStartFault::kFrozen, static_cast<double>(axis)}};
+      return Fail({.fault = RailStartFault::kFrozen, .axis = axis});
     }
     if (first.accel_sigma[axis] <= kFrozen * first.accel_sigma.maxCoeff()) {
-      return Failure{RailStartFailure{RailStartFault::kFrozen, 3.0 + axis}};
+      return Fail({.fault = RailStartFault::kFrozen, .axis = 3 + axis});
     }
   }
   const double expected = setup.imu.noise.angle_random_walk_rad * std::sqrt(setup.imu.rate_hz);
@@ -145,15 +149,24 @@ Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup
         IsNear(mean.accel, signature.mean_accel_m_s2, signature.sigma_accel_m_s2, samples)) {
       continue;
     }
-    return Failure{
-        RailStartFailure{RailStartFault::kMovesAtStart, SecondsBetween(begin, imu[at].ends_at)}};
+    return Fail(
+        {.fault = RailStartFault::kMovesAtStart, .at_s = SecondsBetween(begin, imu[at].ends_at)});
   }
-  if (is_wrong_rate || is_wrong_force) {
-    return Failure{RailStartFailure{
-        RailStartFault::kDegreesAsRadians,
-        is_wrong_rate ? first.gyro_sigma.minCoeff() / expected : gravity / setup.gravity_m_s2}};
+  if (is_wrong_rate) {
+    return Fail(
+        {.fault = RailStartFault::kWrongRateUnit, .times = first.gyro_sigma.minCoeff() / expected});
+  }
+  if (is_wrong_force) {
+    return Fail({.fault = RailStartFault::kWrongForce, .times = gravity / setup.gravity_m_s2});
   }
   const Mean all = MeanOf(imu, 0, end);
+  const double bias_rad_s = std::hypot(setup.imu.gyro_bias_sigma_rad_s, kEarthRate_rad_s);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double times = std::abs(all.gyro[axis]) / bias_rad_s;
+    if (times > kMostBias) {
+      return Fail({.fault = RailStartFault::kBiasTooLarge, .axis = axis, .times = times});
+    }
+  }
   return RestSignature{all.gyro, all.accel, all.gyro_sigma, all.accel_sigma};
 }
 
@@ -178,8 +191,12 @@ Result<Eigen::Quaterniond, RailStartFailure> FindStartAttitude(const RailSetup& 
     const Eigen::Vector3d x = level * Eigen::Vector3d::UnitX();
     return headed(*setup.start.heading_rad - std::atan2(x.y(), x.x()));
   }
-  if (!setup.camera || recording.images.empty()) {
-    return Failure{RailStartFailure{RailStartFault::kNoHeading, 0.0}};
+  const bool sees_targets =
+      std::any_of(recording.images.begin(), recording.images.end(), [](const TargetImage& image) {
+        return !image.pixels.empty();
+      });
+  if (!setup.camera || !sees_targets) {
+    return Fail({.fault = RailStartFault::kNoHeading});
   }
   // Coarse to fine; the cap keeps the worst of a wrong match the same wherever one looks.
   double best_rad = 0.0;
@@ -203,7 +220,7 @@ Result<Eigen::Quaterniond, RailStartFailure> FindStartAttitude(const RailSetup& 
   // Far off everywhere: these are other targets, or it stands elsewhere.
   least = MeanOff(setup, recording, headed(best_rad), 0.25 * setup.camera->model.fx_px);
   if (least > 0.02 * setup.camera->model.fx_px) {
-    return Failure{RailStartFailure{RailStartFault::kNoHeading, least}};
+    return Fail({.fault = RailStartFault::kNoTargetFits, .off_px = least});
   }
   return headed(best_rad);
 }

@@ -23,18 +23,27 @@ struct RestSignature {
 };
 
 enum class RailStartFault {
-  kNoImu,             // fewer than a second of samples
-  kNoRest,            // start.at_rest_s is less than two seconds
-  kMovesAtStart,      // the unit moves while it is said to rest
-  kDegreesAsRadians,  // rates or forces are in another unit
-  kFrozen,            // an axis shows one and the same number
-  kNoHeading,         // neither given nor seen by the camera
+  kNoImu,          // fewer than a second of samples
+  kNoRest,         // start.at_rest_s is less than two seconds
+  kMovesAtStart,   // the unit moves while it is said to rest
+  kWrongRateUnit,  // the gyros' noise is far from the data sheet's: degrees for radians
+  kWrongForce,     // the accelerometers do not show gravity: another unit
+  kBiasTooLarge,   // a gyro shows more at rest than its data sheet and the Earth allow
+  kFrozen,         // an axis shows one and the same number
+  kNoHeading,      // neither given, nor is a target seen
+  kNoTargetFits,   // whatever the heading, the targets do not lie where they should
 };
 
 struct RailStartFailure {
   RailStartFault fault = RailStartFault::kNoImu;
-  double at_s = 0.0;  // kMovesAtStart: since the first sample; kFrozen: number of the axis, 0..5
+  double at_s = 0.0;    // kMovesAtStart: since the first sample
+  int axis = 0;         // kFrozen, kBiasTooLarge: gyro x, y, z, accelerometer x, y, z
+  double times = 0.0;   // kWrongRateUnit, kWrongForce, kBiasTooLarge: shown over expected
+  double off_px = 0.0;  // kNoTargetFits: mean distance
 };
+
+// What the Earth's turning may add to a gyro's bias.
+inline constexpr double kEarthRate_rad_s = 7.292115e-5;
 
 // The signature of the rest at the start, or what is wrong with it.
 Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup,

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <random>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -239,6 +241,80 @@ TEST(RailLine, SaysWhichStretchTheUnitBridgedAlone) {
   EXPECT_LT(Compare(*line, run.truth).error_over_sigma, 1.6);
 }
 
+// A wheel with a circumference that is one in a hundred wrong, for a run that sees its targets only
+// at the beginning and at the end.
+TEST(RailLine, AWheelHoldsWhatTheUnitBridges) {
+  Eigen::Vector3d with_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d without_mm = Eigen::Vector3d::Zero();
+  double squared = 0.0;
+  double scale_squared = 0.0;
+  constexpr int kSeeds = 6;
+  for (std::uint64_t seed = 21; seed < 21 + kSeeds; ++seed) {
+    RailScene scene;
+    scene.seed = seed;
+    scene.speed_m_s = 0.05;
+    scene.end_rest_s = 0.0;
+    GeneratedRun run = GenerateRail(scene);
+    const Timestamp begin = run.recording.images.front().stamped_at;
+    std::erase_if(run.recording.images, [&](const TargetImage& image) {
+      return SecondsBetween(begin, image.stamped_at) > 14.0;
+    });
+    const auto without = SolveRailLine(run.setup, run.recording, RailMethod::kSmoothed);
+    ASSERT_TRUE(without);
+
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> noise(0.0, 2e-4);
+    double run_m = 0.0;
+    for (std::size_t i = 1; i < run.truth.size(); ++i) {
+      const auto& from = run.truth[i - 1];
+      const auto& to = run.truth[i];
+      run_m +=
+          (from.world_from_imu.conjugate() * (to.position_world_m - from.position_world_m)).x();
+      if (i % 20 == 0) run.recording.odometer.push_back({to.at, run_m / 1.01 + noise(random)});
+    }
+    RailOdometer wheel;
+    wheel.sigma_m = 2e-4;
+    wheel.sigma_scale = 0.01;
+    wheel.mounting.sigma_side_m_s = 0.1;
+    run.setup.odometer = wheel;
+    const auto with = SolveRailLine(run.setup, run.recording, RailMethod::kSmoothed);
+    ASSERT_TRUE(with);
+    const Outcome outcome = Compare(*with, run.truth);
+    with_mm += outcome.largest_mm / kSeeds;
+    without_mm += Compare(*without, run.truth).largest_mm / kSeeds;
+    squared += std::pow(outcome.error_over_sigma, 2) / kSeeds;
+    const RailEstimate& scale = EstimateOf(*with, "odometer_scale");
+    EXPECT_EQ(scale.missing_motion, "");
+    scale_squared += std::pow((scale.value - 0.01) / scale.sigma, 2) / kSeeds;
+    EXPECT_GT(with->consistency[static_cast<std::size_t>(FusionUpdate::kOdometer)].accepted, 300u);
+  }
+  std::printf("largest, mm: %.1f %.1f %.1f with, %.1f %.1f %.1f without; error over sigma %.2f\n",
+              with_mm.x(),
+              with_mm.y(),
+              with_mm.z(),
+              without_mm.x(),
+              without_mm.y(),
+              without_mm.z(),
+              std::sqrt(squared));
+  EXPECT_LT(with_mm.y(), 0.3 * without_mm.y());
+  EXPECT_LT(std::sqrt(squared), 1.5);
+  EXPECT_LT(std::sqrt(scale_squared), 2.0);
+}
+
+TEST(RailLine, WhatLiesOutsideOfTheSamplesIsTold) {
+  GeneratedRun run = GenerateRail({.seed = 10});
+  const Timestamp end = run.recording.imu.back().ends_at;
+  run.recording.tilts.push_back({end + std::chrono::seconds(1), {}});
+  run.recording.images.push_back({end + std::chrono::seconds(2), {}});
+  const auto line = SolveRailLine(run.setup, run.recording, RailMethod::kSmoothed);
+  ASSERT_TRUE(line);
+  std::vector<std::string> told;
+  for (const RailRejection& one : line->rejections) {
+    if (one.why_not == "outside_of_samples" && one.at > end) told.push_back(one.what);
+  }
+  EXPECT_THAT(told, testing::ElementsAre("tilt", "targets"));
+}
+
 TEST(RailLine, WithoutImagesTheHeadingMustBeGiven) {
   RailScene scene;
   scene.seed = 7;
@@ -248,6 +324,7 @@ TEST(RailLine, WithoutImagesTheHeadingMustBeGiven) {
   ASSERT_FALSE(without);
   EXPECT_EQ(without.error().fault, RailStartFault::kNoHeading);
   run.setup.start.heading_rad = -DegToRad(90.0);
+  run.setup.start.sigma_heading_rad = DegToRad(0.05);
   const auto with = SolveRailLine(run.setup, run.recording, RailMethod::kSmoothed);
   ASSERT_TRUE(with);
   // The rest at the end takes what the integration has gathered out again.
@@ -282,12 +359,17 @@ TEST(RailStart, WhatIsWrongIsSaid) {
        [](GeneratedRun& run) {
          for (ImuSample& sample : run.recording.imu) sample.gyro_rad_s *= 180.0 / 3.14159265;
        },
-       RailStartFault::kDegreesAsRadians},
+       RailStartFault::kWrongRateUnit},
       {"in g",
        [](GeneratedRun& run) {
          for (ImuSample& sample : run.recording.imu) sample.accel_m_s2 /= 9.80665;
        },
-       RailStartFault::kDegreesAsRadians},
+       RailStartFault::kWrongForce},
+      {"biased",
+       [](GeneratedRun& run) {
+         for (ImuSample& sample : run.recording.imu) sample.gyro_rad_s.z() += 0.005;
+       },
+       RailStartFault::kBiasTooLarge},
       {"frozen",
        [](GeneratedRun& run) {
          for (ImuSample& sample : run.recording.imu) sample.gyro_rad_s.y() = 0.001;
@@ -299,6 +381,11 @@ TEST(RailStart, WhatIsWrongIsSaid) {
        RailStartFault::kNoRest},
       {"elsewhere",
        [](GeneratedRun& run) { run.setup.start.position_world_m += Eigen::Vector3d(0, 0, 5); },
+       RailStartFault::kNoTargetFits},
+      {"sees nothing",
+       [](GeneratedRun& run) {
+         for (TargetImage& image : run.recording.images) image.pixels.clear();
+       },
        RailStartFault::kNoHeading},
   };
   for (const BadStart& one : cases) {
@@ -329,7 +416,7 @@ constexpr const char* kRailYaml =
     "imu: {rate_hz: 200, angle_random_walk_deg_sqrt_h: 0.2, velocity_random_walk_ug_sqrt_hz: 30, "
     "gyro_bias_deg_h: 30, accel_bias_mg: 1.0}\n"
     "start: {position_m: [1, 13.45, 1.2], sigma_position_mm: 0.1, heading_known: true, "
-    "heading_deg: -90, at_rest_s: 9.5}\n";
+    "heading_deg: -90, sigma_heading_deg: 0.05, at_rest_s: 9.5}\n";
 
 class LineCommand : public testing::Test {
  protected:
@@ -421,7 +508,12 @@ TEST_F(LineCommand, FaultsNameFileLineAndColumn) {
   EXPECT_THAT(with("rate_hz: 200", "rate_hz: -1"), HasSubstr("rail.yaml:2: imu.rate_hz"));
   EXPECT_THAT(with("at_rest_s: 9.5", "at_rest_s: 13"), HasSubstr("the trolley moves"));
   EXPECT_THAT(with("at_rest_s: 9.5", "at_rest_s: 1"), HasSubstr("start.at_rest_s"));
-  EXPECT_THAT(with("heading_deg: -90, ", ""), HasSubstr("heading_deg"));
+  EXPECT_THAT(with(" heading_deg: -90,", ""), HasSubstr("there is no heading_deg"));
+  EXPECT_THAT(with(" sigma_heading_deg: 0.05,", ""), HasSubstr("there is no sigma_heading_deg"));
+  EXPECT_THAT(with("start:", "odometer: {position_m: [0, 0, 0], sigma_mm: 0}\nstart:"),
+              testing::AllOf(HasSubstr("rail.yaml:3: odometer.rotation"),
+                             HasSubstr("odometer.sigma_mm"),
+                             HasSubstr("odometer.sigma_side_mm_s")));
   EXPECT_THAT(with("accel_bias_mg", "accel_bias_ug"), HasSubstr("accel_bias_ug"));
   EXPECT_THAT(with("gravity_m_s2: 9.80665", "gravity_m_s2: 981"), HasSubstr("gravity_m_s2"));
 
@@ -435,6 +527,16 @@ TEST_F(LineCommand, FaultsNameFileLineAndColumn) {
   WriteText(folder_ / "tilt.csv", "stamp_ns,sensor,beta_deg,gamma_deg\n1,front,0,0\n");
   EXPECT_EQ(Run(), ExitCode::kBadInput);
   EXPECT_THAT(err_.str(), HasSubstr("tilt.csv:2: column sensor"));
+}
+
+TEST_F(LineCommand, WhatIsNotUsedIsTold) {
+  WriteText(folder_ / "tilt.csv", "stamp_ns,sensor,beta_deg,gamma_deg\n1,trolley,0,0\n");
+  WriteText(folder_ / "odometer.csv", "stamp_ns,distance_m\n1,0\n2,0.5\n");
+  WriteText(folder_ / "frames.csv", "stamp_ns,file\n");
+  ASSERT_EQ(Run(), ExitCode::kDone) << err_.str();
+  for (const char* file : {"tilt.csv", "odometer.csv", "frames.csv"}) {
+    EXPECT_THAT(err_.str(), HasSubstr(std::string(file) + ": is not used")) << file;
+  }
 }
 
 TEST_F(LineCommand, MissingSamplesAreBridgedAndTold) {
