@@ -144,7 +144,11 @@ TEST_P(EmulatedUnit, CountsEveryDamageAndGoesOn) {
   const InertialCounters after = Counters();
   EXPECT_EQ(after.overloads - before.overloads, 10u);
   EXPECT_EQ(after.starting_up - before.starting_up, 10u);
-  EXPECT_EQ(after.faulty - before.faulty, 10u);
+  // Half a datagram and the noise behind it can be as long as a whole one, and an eight-bit
+  // checksum is right by chance once in 256; the noise says in its status that it is faulty.
+  const bool is_weak = settings_.family == StimFamily::kStim210;
+  EXPECT_GE(after.faulty - before.faulty, 10u);
+  EXPECT_LE(after.faulty - before.faulty, is_weak ? 12u : 10u);
   EXPECT_GE(after.garbled - before.garbled, 8u);  // a flipped identifier is only skipped
   EXPECT_GT(after.skipped_bytes, before.skipped_bytes);
   // Dropped, flipped (but for bits of CR LF) and cut ones; a terminal that is full may lose more.
