@@ -69,6 +69,26 @@ std::vector<std::string> Problems(const ParticipantConfig& config) {
   return problems;
 }
 
+// What is told is told in the order in which it became so: it is found and put in line under one
+// lock. The handler is called without that lock, because it may wait for somebody who waits for
+// DDS; who comes meanwhile leaves its news to the thread that tells. Nothing is told to whoever is
+// about to go.
+template <class NewsOf>
+void ParticipantCore::Tell(const NewsOf& news_of) {
+  std::unique_lock lock(alarm_mutex_);
+  for (Alarm& news : news_of(causes_)) untold_.push_back(std::move(news));
+  if (is_telling_) return;
+  is_telling_ = true;
+  while (!untold_.empty()) {
+    const Alarm alarm = untold_.front();
+    untold_.pop_front();
+    lock.unlock();
+    if (on_alarm_ && !is_silent_) on_alarm_(alarm);
+    lock.lock();
+  }
+  is_telling_ = false;
+}
+
 ParticipantCore::ParticipantCore(const ParticipantConfig& config, AlarmHandler on_alarm)
     : config_(config), on_alarm_(std::move(on_alarm)) {
   TBM_CHECK(Problems(config).empty());
@@ -88,6 +108,7 @@ ParticipantCore::~ParticipantCore() {
   }
   ending_.notify_all();
   watcher_.join();
+  is_silent_ = true;
   Stop();
 }
 
@@ -96,13 +117,8 @@ void ParticipantCore::Watch() {
   while (!ending_.wait_for(lock, kWatchPeriod, [this] { return is_ending_; })) {
     FollowAddresses();
     for (Endpoint* endpoint : endpoints_) endpoint->Poll();
-    std::vector<Alarm> expired;
-    {
-      const std::lock_guard alarm_lock(alarm_mutex_);
-      expired = causes_.Expire(std::chrono::steady_clock::now());
-    }
     lock.unlock();
-    Tell(std::move(expired));
+    Tell([](AlarmCauses& causes) { return causes.Expire(std::chrono::steady_clock::now()); });
     lock.lock();
   }
 }
@@ -172,12 +188,7 @@ void ParticipantCore::Stop() {
     const std::lock_guard lock(foreign_mutex_);
     foreign_.clear();
   }
-  std::vector<Alarm> ended;
-  {
-    const std::lock_guard lock(alarm_mutex_);
-    ended = causes_.EndOfNetwork();
-  }
-  Tell(std::move(ended));
+  Tell([](AlarmCauses& causes) { return causes.EndOfNetwork(); });
 }
 
 void ParticipantCore::Attach(Endpoint& endpoint) {
@@ -193,30 +204,12 @@ void ParticipantCore::Detach(Endpoint& endpoint) {
 }
 
 void ParticipantCore::Raise(Alarm alarm) {
-  std::vector<Alarm> news;
-  {
-    const std::lock_guard lock(alarm_mutex_);
-    auto told = causes_.Told(std::move(alarm), std::chrono::steady_clock::now());
+  Tell([&](AlarmCauses& causes) {
+    std::vector<Alarm> news;
+    auto told = causes.Told(std::move(alarm), std::chrono::steady_clock::now());
     if (told) news.push_back(std::move(*told));
-  }
-  Tell(std::move(news));
-}
-
-// The handler may wait for a lock that is held by somebody who waits for DDS: it is called without
-// any of ours. Who comes while another thread tells leaves its news to that one.
-void ParticipantCore::Tell(std::vector<Alarm> news) {
-  std::unique_lock lock(alarm_mutex_);
-  untold_.insert(untold_.end(), news.begin(), news.end());
-  if (is_telling_) return;
-  is_telling_ = true;
-  while (!untold_.empty()) {
-    const Alarm alarm = untold_.front();
-    untold_.pop_front();
-    lock.unlock();
-    if (on_alarm_) on_alarm_(alarm);
-    lock.lock();
-  }
-  is_telling_ = false;
+    return news;
+  });
 }
 
 bool ParticipantCore::IsForeign(const rtps::GuidPrefix_t& process) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
@@ -59,7 +60,8 @@ class ParticipantCore final : private fdds::DomainParticipantListener {
   void FollowAddresses();  // with mutex_ held
   bool Start(const std::vector<std::string>& addresses);
   void Stop();
-  void Tell(std::vector<Alarm> news);
+  template <class NewsOf>
+  void Tell(const NewsOf& news_of);
   void on_participant_discovery(fdds::DomainParticipant* participant,
                                 rtps::ParticipantDiscoveryInfo&& info) override;
 
@@ -79,7 +81,8 @@ class ParticipantCore final : private fdds::DomainParticipantListener {
   mutable std::mutex foreign_mutex_;  // taken inside DDS callbacks, never while asking for mutex_
   std::set<rtps::GuidPrefix_t> foreign_;
 
-  std::mutex alarm_mutex_;  // guards all below; the handler is called without it
+  std::atomic<bool> is_silent_ = false;  // it ends: its handler may be gone
+  std::mutex alarm_mutex_;               // guards all below; the handler is called without it
   AlarmCauses causes_;
   std::deque<Alarm> untold_;
   bool is_telling_ = false;

@@ -163,6 +163,8 @@ async function main() {
   await start_all();
   const url = /url=(\S+)/.exec(log_of('hmi_bridge'))[1];
   const password = readFileSync(join(place, 'console/first_password.txt'), 'utf8').trim();
+  check('the log says where the first password stands, and not what it is',
+        log_of('hmi_bridge').includes('code=first_user') && !log_of('hmi_bridge').includes(password));
 
   const browser = await chromium.launch({executablePath: '/usr/bin/chromium', args: ['--headless', '--no-sandbox', '--disable-gpu',
     '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync']});

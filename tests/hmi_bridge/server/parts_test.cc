@@ -140,8 +140,16 @@ TEST(ServerOptions, ProblemsAreSentences) {
   options.listen = {{"0.0.0.0", 443}};
   options.tls = TlsFiles{"/nowhere.pem", "/nowhere.key"};
   EXPECT_THAT(Problems(options), ElementsAre(HasSubstr("/nowhere.pem: cannot be read")));
-  options.listen.clear();
+  // A certificate that is still to be made excuses that there is none, and nothing else.
   options.tls.reset();
+  EXPECT_TRUE(Problems(options, true).empty());
+  options.allowed_names = {"http://x"};
+  options.listen.push_back({"localhost", 80});
+  EXPECT_THAT(
+      Problems(options, true),
+      ElementsAre(HasSubstr("'localhost' is no IPv4 or IPv6 address"), HasSubstr("'http://x'")));
+  options.allowed_names.clear();
+  options.listen.clear();
   EXPECT_THAT(Problems(options), ElementsAre(HasSubstr("no address to listen on")));
 }
 
