@@ -18,6 +18,10 @@ if(TBM_SANITIZE)
   endif()
   target_link_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE})
 endif()
+# A third of the time of the linker that is asked otherwise. It does not know clang's sanitizers.
+if(NOT CMAKE_CROSSCOMPILING)
+  target_link_options(tbm_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-fuse-ld=gold>)
+endif()
 # Aravis asks for it; what is precompiled must have been asked the same.
 target_compile_options(tbm_options INTERFACE -pthread)
 
@@ -25,6 +29,10 @@ target_compile_options(tbm_options INTERFACE -pthread)
 # (at which GCC 12 sees copies beyond the end of a std::string where there are none).
 set(tbm_test_optimisation -O1
     $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>)
+# The fuzzer follows what the product does, not what a test does.
+if(TBM_SANITIZE MATCHES "address")
+  set(tbm_test_optimisation -O0 $<$<CXX_COMPILER_ID:Clang>:-fno-sanitize=fuzzer-no-link>)
+endif()
 
 # The edges (command lines, files, DDS, the console) wait for people, disks and networks: what they
 # gain from -O3 nobody sees, and what they cost the compiler everybody waits for. A folder of them sets
@@ -65,15 +73,25 @@ function(tbm_optimise target)
   endif()
 endfunction()
 
+# In trees that nobody edits in, a library is compiled in groups of files: what they all include is
+# read once. The optimised tree takes each file alone and notices an include that is lacking. A library
+# whose files use one name for different things is ALONE everywhere.
+function(tbm_group target is_alone)
+  if((TBM_SANITIZE OR CMAKE_CROSSCOMPILING) AND NOT is_alone)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
+  endif()
+endfunction()
+
 # Tests that also run under the sanitizers carry the label asan or tsan and are built by one target.
 add_custom_target(sanitized_tests)
 
-# tbm_library(pose_geometry SOURCES a.cc DEPS Eigen3::Eigen)   makes the static library tbm_pose_geometry
+# tbm_library(pose_geometry [ALONE] SOURCES a.cc DEPS Eigen3::Eigen)   makes the static library tbm_pose_geometry
 function(tbm_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "ALONE" "" "SOURCES;DEPS" ${ARGN})
   add_library(tbm_${name} STATIC ${ARG_SOURCES})
   target_link_libraries(tbm_${name} PUBLIC tbm_options ${ARG_DEPS})
   tbm_optimise(tbm_${name})
+  tbm_group(tbm_${name} ${ARG_ALONE})
 endfunction()
 
 # tbm_program(camera_box SOURCES main.cc DEPS ...)   makes the executable of that name in <build>/bin

@@ -1,11 +1,11 @@
-#include "tests/guidance/rail/rail_generator.h"
+#include "guidance/rail_study/rail_scene.h"
 
 #include <cmath>
 #include <numbers>
 #include <random>
 #include <string>
 
-namespace tbm::test {
+namespace tbm {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -188,6 +188,8 @@ GeneratedRun GenerateRail(const RailScene& scene) {
   const Eigen::Quaterniond camera_from_imu =
       Turn(Eigen::Vector3d(0.5, 2.0, -0.5) * deg) * Eigen::Quaterniond(looks_ahead);
   const Eigen::Vector3d camera_in_imu_m(0.15, -0.05, 0.1);
+  run.camera_from_imu = camera_from_imu;
+  run.camera_in_imu_m = camera_in_imu_m;
   const Eigen::Quaterniond housing_from_imu = Turn(Eigen::Vector3d(0.4, -0.3, 0.2) * deg);
   setup.tilt = TiltMounting{housing_from_imu, 0.003 * deg};
   RailCamera camera;
@@ -237,7 +239,7 @@ GeneratedRun GenerateRail(const RailScene& scene) {
     if (i % static_cast<int>(scene.rate_hz / 20.0) == 0 && i > 0) {
       // Read over the same interval.
       const Eigen::Vector3d up = housing_from_imu * force.normalized();
-      TiltSample tilt;
+      TrolleyTilt tilt;
       tilt.sensed_at = sample.ends_at;
       tilt.angles.beta_rad = -std::asin(up.x()) + draw.Normal(setup.tilt->sigma_rad);
       tilt.angles.gamma_rad = std::asin(up.y()) + draw.Normal(setup.tilt->sigma_rad);
@@ -277,4 +279,4 @@ GeneratedRun GenerateRail(const RailScene& scene) {
   return run;
 }
 
-}  // namespace tbm::test
+}  // namespace tbm
