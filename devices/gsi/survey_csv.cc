@@ -4,6 +4,9 @@
 
 #include <fmt/format.h>
 
+#include "devices/gsi/gsi.h"
+#include "pose/base/length.h"
+
 namespace tbm {
 namespace {
 
@@ -17,6 +20,25 @@ std::string Field(const std::string& name) {
     quoted += c;
   }
   return quoted + "\"";
+}
+
+Result<std::vector<SurveyRow>, FileFault> ReadGsi(std::string_view text, const std::string& file) {
+  const auto blocks = ParseGsi(text, file);
+  if (!blocks) return Failure{blocks.error()};
+  std::vector<SurveyRow> rows;
+  for (const GsiBlock& block : *blocks) {
+    const auto point = PointOf(block, file);
+    if (!point) return Failure{point.error()};
+    if (!*point) continue;
+    const GsiPoint& gsi = **point;
+    rows.push_back({std::nullopt,
+                    gsi.name,
+                    gsi.east_m * kMmPerMetre,
+                    gsi.north_m * kMmPerMetre,
+                    gsi.height_m * kMmPerMetre,
+                    block.line});
+  }
+  return rows;
 }
 
 }  // namespace
@@ -46,6 +68,10 @@ Result<std::vector<SurveyRow>, FileFault> ReadSurveyCsv(std::string text, const 
     rows.push_back(std::move(row));
   }
   return rows;
+}
+
+Result<std::vector<SurveyRow>, FileFault> ReadSurvey(std::string text, const std::string& file) {
+  return LooksLikeGsi(text) ? ReadGsi(text, file) : ReadSurveyCsv(std::move(text), file);
 }
 
 std::string SurveyCsvLine(const SurveyRow& row) {

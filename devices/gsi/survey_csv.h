@@ -24,6 +24,10 @@ struct SurveyRow {
 // Every row of a survey log, in the order of the file. Further columns are ignored.
 Result<std::vector<SurveyRow>, FileFault> ReadSurveyCsv(std::string text, const std::string& file);
 
+// The same from either form: such a table, or a Leica GSI file, whose points have no stamps (east,
+// north, height become x, y, z, and names lose their leading zeros).
+Result<std::vector<SurveyRow>, FileFault> ReadSurvey(std::string text, const std::string& file);
+
 inline constexpr std::string_view kSurveyCsvHeader = "stamp_ns,point,x_mm,y_mm,z_mm\n";
 
 // One line of such a log, with LF: coordinates to a tenth of a micrometre, names in quotes where

@@ -15,8 +15,6 @@
 namespace tbm {
 namespace {
 
-constexpr double kMmPerM = 1000.0;
-
 Result<std::optional<Timestamp>, FileFault> OptionalStamp(const CsvTable& table,
                                                           std::size_t row,
                                                           std::size_t column) {
@@ -53,31 +51,6 @@ FileFault NoSuchPoint(const std::string& file,
                       std::string_view point,
                       const std::set<std::string>& names) {
   return {file, 0, "", fmt::format("has no point {}; it has {}", Quoted(point), Names(names))};
-}
-
-Result<SurveyLog, FileFault> ReadGsiLog(std::string_view text,
-                                        const std::string& file,
-                                        std::string_view point) {
-  const auto blocks = ParseGsi(text, file);
-  if (!blocks) return Failure{blocks.error()};
-  SurveyLog log;
-  std::set<std::string> others;
-  for (const GsiBlock& block : *blocks) {
-    const auto found = PointOf(block, file);
-    if (!found) return Failure{found.error()};
-    if (!*found) continue;
-    const GsiPoint& gsi = **found;
-    if (gsi.name != WithoutLeadingZeros(point)) {
-      ++log.other_points;
-      others.insert(gsi.name);
-      continue;
-    }
-    log.points.push_back({std::nullopt,
-                          Eigen::Vector3d(gsi.east_m, gsi.north_m, gsi.height_m) * kMmPerM,
-                          block.line});
-  }
-  if (log.points.empty()) return Failure{NoSuchPoint(file, point, others)};
-  return log;
 }
 
 // Either all rows of a table have a stamp or none: a mixture would pair some rows in time and
@@ -209,8 +182,7 @@ Result<std::vector<PlacedPoint>, FileFault> ReadPosedPoint(std::string text,
 Result<SurveyLog, FileFault> ReadSurveyLog(std::string text,
                                            const std::string& file,
                                            std::string_view point) {
-  if (LooksLikeGsi(text)) return ReadGsiLog(text, file, point);
-  const auto rows = ReadSurveyCsv(std::move(text), file);
+  const auto rows = ReadSurvey(std::move(text), file);
   if (!rows) return Failure{rows.error()};
   SurveyLog log;
   std::set<std::string> others;

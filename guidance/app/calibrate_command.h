@@ -38,4 +38,37 @@ struct CalibrateTiltRequest {
 // kBadInput, with the missing motion named, where the placements do not say enough.
 ExitCode RunCalibrateTilt(const CalibrateTiltRequest& request, const Console& console);
 
+struct CalibrateTargetRequest {
+  std::string folder;                     // of a file of points for each placement, and tilt.csv
+  std::string nominal;                    // rig file, or a table of the drawing
+  std::string out;                        // the target's part of a rig file
+  std::string report;                     // folder; empty: only print
+  double sigma_mm = 0.3;                  // of one coordinate of a measured LED
+  double most_off_mm = 20.0;              // how far the drawing may be from what was built
+  double sigma_deg = 0.005;               // of a reading, where tilt.csv has no sigma_deg
+  std::vector<double> sign = {1.0, 1.0};  // of beta and gamma, as in a rig file
+  bool force = false;
+};
+
+// `tbm calibrate target`: the LEDs' places, and how the board's inclinometer is built to them, from
+// total-station points. kBadInput, with file, LED and size of what is wrong, where they do not fit.
+ExitCode RunCalibrateTarget(const CalibrateTargetRequest& request, const Console& console);
+
+struct CalibrateRigRequest {
+  std::string camera;  // files of the other three, and of what a person knows
+  std::string tilt;
+  std::string target;
+  std::string points;
+  std::string name;         // empty: the points' file says it
+  std::string out;          // the rig file
+  std::string report;       // folder; empty: only print
+  double distance_m = 4.0;  // from the camera to the LEDs, of the budget
+  double centre_sigma_px = 0.05;
+  std::vector<double> facing;  // empty: found from the LEDs and points
+  bool force = false;
+};
+
+// `tbm calibrate rig`: a rig file of its parts, and what it is worth at its points.
+ExitCode RunCalibrateRig(const CalibrateRigRequest& request, const Console& console);
+
 }  // namespace tbm

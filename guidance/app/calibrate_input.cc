@@ -19,12 +19,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool IsPictureName(const fs::path& path) {
-  std::string suffix = path.extension().string();
-  std::transform(suffix.begin(), suffix.end(), suffix.begin(), [](unsigned char c) {
+bool EndsWithOneOf(const fs::path& path, std::span<const std::string_view> endings) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) {
     return static_cast<char>(std::tolower(c));
   });
-  return suffix == ".png" || suffix == ".pgm" || suffix == ".tif" || suffix == ".tiff";
+  return std::find(endings.begin(), endings.end(), ending) != endings.end();
 }
 
 std::string SizeFault(const std::string& path, ImageSize size, ImageSize wanted, bool is_given) {
@@ -40,9 +40,14 @@ std::string SizeFault(const std::string& path, ImageSize size, ImageSize wanted,
 // Rows of the file, one after the other; what is wrong is collected.
 class TiltRows {
  public:
-  TiltRows(const CsvTable& table, double default_sigma_deg, double beta_sign, double gamma_sign)
+  TiltRows(const CsvTable& table,
+           const TiltTable& what,
+           double default_sigma_deg,
+           double beta_sign,
+           double gamma_sign)
       : table_(table),
-        image_(*table.Column("image")),
+        noun_(what.noun),
+        name_(*table.Column(what.column)),
         beta_(*table.Column("beta_deg")),
         gamma_(*table.Column("gamma_deg")),
         sigma_(table.Column("sigma_deg")),
@@ -51,10 +56,15 @@ class TiltRows {
         gamma_sign_(gamma_sign) {}
 
   void Read(std::size_t row) {
-    const std::string image(table_.Field(row, image_));
-    if (image.empty()) return Fault(row, image_, "is empty; it must name a picture of the folder");
-    if (!names_.insert(image).second) {
-      return Fault(row, image_, Quoted(image) + " stands twice; one reading belongs to a picture");
+    const std::string name(table_.Field(row, name_));
+    if (name.empty()) {
+      return Fault(row, name_, fmt::format("is empty; it must name a {} of the folder", noun_));
+    }
+    if (!names_.insert(name).second) {
+      return Fault(
+          row,
+          name_,
+          fmt::format("{} stands twice; one reading belongs to a {}", Quoted(name), noun_));
     }
     const auto beta_deg = table_.Finite(row, beta_);
     const auto gamma_deg = table_.Finite(row, gamma_);
@@ -73,7 +83,7 @@ class TiltRows {
                                *beta_deg,
                                *gamma_deg));
     }
-    rows_.push_back({image, *up, DegToRad(sigma_deg)});
+    rows_.push_back({name, table_.line(row), *up, DegToRad(sigma_deg)});
   }
 
   std::vector<CalibrationTilt>& rows() { return rows_; }
@@ -98,7 +108,8 @@ class TiltRows {
   }
 
   const CsvTable& table_;
-  std::size_t image_;
+  std::string_view noun_;
+  std::size_t name_;
   std::size_t beta_;
   std::size_t gamma_;
   std::optional<std::size_t> sigma_;
@@ -119,22 +130,29 @@ std::optional<Board> BoardOf(const std::string& text, const Console& console) {
   return std::nullopt;
 }
 
-Result<std::vector<std::string>, std::string> PictureNames(const std::string& folder) {
+Result<std::vector<std::string>, std::string> NamesIn(const std::string& folder,
+                                                      std::span<const std::string_view> endings) {
   std::error_code error;
   std::vector<std::string> names;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
     std::error_code ignored;
-    if (entry->is_regular_file(ignored) && IsPictureName(entry->path())) {
+    if (entry->is_regular_file(ignored) && EndsWithOneOf(entry->path(), endings)) {
       names.push_back(entry->path().filename().string());
     }
   }
   if (error)
     return Failure{fmt::format("{}: cannot be read as a folder: {}", folder, error.message())};
-  if (names.empty()) {
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+Result<std::vector<std::string>, std::string> PictureNames(const std::string& folder) {
+  constexpr std::array<std::string_view, 4> kEndings = {".png", ".pgm", ".tif", ".tiff"};
+  auto names = NamesIn(folder, kEndings);
+  if (names && names->empty()) {
     return Failure{folder + ": holds no picture; grey .png, .pgm or .tiff files belong there"};
   }
-  std::sort(names.begin(), names.end());
   return names;
 }
 
@@ -167,17 +185,19 @@ Result<FoundBoards, std::string> FindBoards(const std::string& folder,
 
 Result<std::vector<CalibrationTilt>, FileFaults> ParseCalibrationTilts(std::string text,
                                                                        const std::string& file,
+                                                                       const TiltTable& what,
                                                                        double default_sigma_deg,
                                                                        double beta_sign,
                                                                        double gamma_sign) {
-  constexpr std::array<std::string_view, 3> kColumns = {"image", "beta_deg", "gamma_deg"};
-  const auto table = CsvTable::Parse(std::move(text), file, kColumns);
+  const std::array<std::string_view, 3> columns = {what.column, "beta_deg", "gamma_deg"};
+  const auto table = CsvTable::Parse(std::move(text), file, columns);
   if (!table) return Failure{FileFaults{table.error()}};
-  TiltRows rows(*table, default_sigma_deg, beta_sign, gamma_sign);
+  TiltRows rows(*table, what, default_sigma_deg, beta_sign, gamma_sign);
   for (std::size_t row = 0; row < table->row_count(); ++row) rows.Read(row);
   if (!rows.faults().empty()) return Failure{std::move(rows.faults())};
   if (rows.rows().empty()) {
-    return Failure{FileFaults{{file, 0, "", "has no rows; one belongs to each picture"}}};
+    return Failure{
+        FileFaults{{file, 0, "", fmt::format("has no rows; one belongs to each {}", what.noun)}}};
   }
   return std::move(rows.rows());
 }

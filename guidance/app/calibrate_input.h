@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,11 @@ std::optional<Board> BoardOf(const std::string& text, const Console& console);
 // Names of all pictures in a folder (.png, .pgm, .tif, .tiff), sorted. Errors: no folder, none in
 // it.
 Result<std::vector<std::string>, std::string> PictureNames(const std::string& folder);
+
+// The same of any files: those whose name ends with one of `endings` (".csv", small letters), in
+// whatever case. Errors: no folder. There may be none.
+Result<std::vector<std::string>, std::string> NamesIn(const std::string& folder,
+                                                      std::span<const std::string_view> endings);
 
 struct FoundPicture {
   std::string name;
@@ -43,17 +49,27 @@ Result<FoundBoards, std::string> FindBoards(const std::string& folder,
                                             std::optional<ImageSize> expected,
                                             const Console& console);
 
+// What a row of tilt.csv belongs to: the column's name, and the word for it in messages.
+struct TiltTable {
+  std::string_view column;
+  std::string_view noun;
+};
+inline constexpr TiltTable kTiltOfPicture{"image", "picture"};
+inline constexpr TiltTable kTiltOfPlacement{"placement", "placement's file"};
+
 // One row of the tilt.csv of a calibration.
 struct CalibrationTilt {
-  std::string image;
+  std::string name;
+  int line = 0;
   Eigen::Vector3d up_in_housing = Eigen::Vector3d::UnitZ();
   double sigma_rad = 0.0;  // of each angle
 };
 
-// `text` has the columns image, beta_deg, gamma_deg and, optional, sigma_deg. Signs are those of
+// `text` has the column of `what`, beta_deg, gamma_deg and, optional, sigma_deg. Signs are those of
 // the rig key `sign`. All faults are collected.
 Result<std::vector<CalibrationTilt>, FileFaults> ParseCalibrationTilts(std::string text,
                                                                        const std::string& file,
+                                                                       const TiltTable& what,
                                                                        double default_sigma_deg,
                                                                        double beta_sign,
                                                                        double gamma_sign);

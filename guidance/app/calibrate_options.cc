@@ -15,7 +15,10 @@ constexpr const char* kCalibrateHelp =
     "\n"
     "Examples\n"
     "  tbm calibrate camera pictures --board chessboard:9x6:25 --out camera.yaml\n"
-    "  tbm calibrate tilt rig --board chessboard:9x6:25 --camera camera.yaml --out tilt.yaml";
+    "  tbm calibrate tilt table --board chessboard:9x6:25 --camera camera.yaml --out tilt.yaml\n"
+    "  tbm calibrate target placements --nominal drawing.csv --out target.yaml\n"
+    "  tbm calibrate rig --camera camera.yaml --tilt tilt.yaml --target target.yaml --points "
+    "points.yaml --out rig.yaml";
 
 constexpr const char* kCameraHelp =
     "FOLDER holds grey pictures (PNG, PGM, TIFF) of one board, all by the same camera, not "
@@ -43,7 +46,45 @@ constexpr const char* kTiltHelp =
     "turning. What motion is missing is said, with exit code 2.\n"
     "\n"
     "Example\n"
-    "  tbm calibrate tilt rig --board chessboard:9x6:25 --camera camera.yaml --out tilt.yaml";
+    "  tbm calibrate tilt table --board chessboard:9x6:25 --camera camera.yaml --out tilt.yaml";
+
+constexpr const char* kTargetHelp =
+    "FOLDER holds a file of total-station points for each placement of the LED board: a CSV with\n"
+    "stamp_ns,point,x_mm,y_mm,z_mm (stamp may be empty), or a Leica GSI-8 / GSI-16 file (.gsi). A "
+    "point has\n"
+    "its LED's name; other points are passed over. tilt.csv: placement,beta_deg,gamma_deg "
+    "(optional\n"
+    "sigma_deg), what the board's inclinometer read in the placement that file is of.\n"
+    "One placement gives the LEDs; from two on a wrong point is seen, from three on it is named. "
+    "For the\n"
+    "inclinometer's mounting R1: six placements, tilted by ten degrees or more, forwards and to a "
+    "side.\n"
+    "--nominal is the last rig file, or the drawing: a .csv with led,x_mm,y_mm,z_mm. The target "
+    "frame stays\n"
+    "that of it. --out gets the target's part of a rig file.\n"
+    "\n"
+    "Example\n"
+    "  tbm calibrate target placements --nominal drawing.csv --sigma-mm 0.2 --out target.yaml "
+    "--report report";
+
+constexpr const char* kRigHelp =
+    "Puts a rig file together from what calibrate camera, tilt and target wrote, and from a file "
+    "that a\n"
+    "person writes:\n"
+    "  rig_name: north_2\n"
+    "  points:\n"
+    "    shield_head: {xyz_mm: [3.0, -5.0, -1600.0], sigma_mm: 0.2}   # in the target frame\n"
+    "An old rig file may stand for any of them. A sigma that is missing is a fault.\n"
+    "\n"
+    "What the calibration is worth is printed for each point: one row for each source of error, in "
+    "mm to the\n"
+    "right, up and along, with the LEDs straight ahead at --distance-m and both inclinometers "
+    "level.\n"
+    "\n"
+    "Example\n"
+    "  tbm calibrate rig --camera camera.yaml --tilt tilt.yaml --target target.yaml --points "
+    "points.yaml\n"
+    "      --out rig.yaml --distance-m 5 --report report";
 
 void AddCamera(CLI::App* calibrate, CalibrateCameraRequest& request) {
   CLI::App* camera = calibrate->add_subcommand("camera", "Camera from pictures of a board");
@@ -58,6 +99,16 @@ void AddCamera(CLI::App* calibrate, CalibrateCameraRequest& request) {
   camera->add_flag("--force,-f", request.force, "replace existing files");
 }
 
+// What every reading of an inclinometer needs.
+void AddTiltReading(CLI::App* command, double& sigma_deg, std::vector<double>& sign) {
+  command->add_option("--sigma-deg", sigma_deg, "of one reading of the inclinometer")
+      ->check(CLI::Range(1e-6, 10.0))
+      ->capture_default_str();
+  command->add_option("--sign", sign, "of beta and gamma, +1 or -1: what a rig file calls sign")
+      ->expected(2)
+      ->check(CLI::IsMember({-1.0, 1.0}));
+}
+
 void AddTilt(CLI::App* calibrate, CalibrateTiltRequest& request) {
   CLI::App* tilt = calibrate->add_subcommand("tilt", "How an inclinometer is built to the camera");
   tilt->footer(kTiltHelp);
@@ -65,13 +116,7 @@ void AddTilt(CLI::App* calibrate, CalibrateTiltRequest& request) {
   tilt->add_option("--board,-b", request.board, "KIND:COLUMNSxROWS:PITCH_MM")->required();
   tilt->add_option("--camera,-c", request.camera, "the camera's file, or a rig file")->required();
   tilt->add_option("--out,-o", request.out, "file to write; - is the standard output")->required();
-  tilt->add_option("--sigma-deg", request.sigma_deg, "of one reading of the inclinometer")
-      ->check(CLI::Range(1e-6, 10.0))
-      ->capture_default_str();
-  tilt->add_option(
-          "--sign", request.sign, "of beta and gamma, +1 or -1: what a rig file calls sign")
-      ->expected(2)
-      ->check(CLI::IsMember({-1.0, 1.0}));
+  AddTiltReading(tilt, request.sigma_deg, request.sign);
   tilt->add_option(
           "--up", request.up_in_board, "x y z of up in the board's frame, where it is known")
       ->expected(3);
@@ -81,23 +126,70 @@ void AddTilt(CLI::App* calibrate, CalibrateTiltRequest& request) {
   tilt->add_flag("--force,-f", request.force, "replace an existing file");
 }
 
+void AddTarget(CLI::App* calibrate, CalibrateTargetRequest& request) {
+  CLI::App* target =
+      calibrate->add_subcommand("target", "LED board from total-station points and tilts");
+  target->footer(kTargetHelp);
+  target->add_option("FOLDER", request.folder, "folder of placements and tilt.csv")->required();
+  target->add_option("--nominal,-n", request.nominal, "rig file, or drawing.csv")->required();
+  target->add_option("--out,-o", request.out, "file to write; - is the standard output")
+      ->required();
+  target->add_option("--report", request.report, "folder for target.csv and target.json");
+  target->add_option("--sigma-mm", request.sigma_mm, "of one coordinate of a measured point")
+      ->check(CLI::Range(1e-3, 100.0))
+      ->capture_default_str();
+  target
+      ->add_option(
+          "--most-off-mm", request.most_off_mm, "how far an LED may be from where it is drawn")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  AddTiltReading(target, request.sigma_deg, request.sign);
+  target->add_flag("--force,-f", request.force, "replace existing files");
+}
+
+void AddRig(CLI::App* calibrate, CalibrateRigRequest& request) {
+  CLI::App* rig = calibrate->add_subcommand("rig", "A rig file of its parts, and what it is worth");
+  rig->footer(kRigHelp);
+  rig->add_option("--camera,-c", request.camera, "what calibrate camera wrote")->required();
+  rig->add_option("--tilt,-t", request.tilt, "what calibrate tilt wrote")->required();
+  rig->add_option("--target", request.target, "what calibrate target wrote")->required();
+  rig->add_option("--points,-p", request.points, "points and rig_name")->required();
+  rig->add_option("--out,-o", request.out, "rig file to write; - is the standard output")
+      ->required();
+  rig->add_option("--name", request.name, "rig_name");
+  rig->add_option("--report", request.report, "folder for rig.csv and rig.json");
+  rig->add_option("--distance-m", request.distance_m, "from the camera to the LEDs")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  rig->add_option("--centre-sigma-px", request.centre_sigma_px, "of an LED's centre in one frame")
+      ->check(CLI::Range(1e-3, 10.0))
+      ->capture_default_str();
+  rig->add_option("--facing", request.facing, "x y z in the target frame, from LEDs to camera")
+      ->expected(3);
+  rig->add_flag("--force,-f", request.force, "replace existing files");
+}
+
 }  // namespace
 
 CLI::App* AddCalibrate(CLI::App& app, CalibrateRequests& requests) {
   CLI::App* calibrate =
-      app.add_subcommand("calibrate", "Cameras and inclinometers from pictures of a board");
+      app.add_subcommand("calibrate", "Camera, inclinometers, LED board, and the rig file of them");
   calibrate->footer(kCalibrateHelp);
   calibrate->require_subcommand(1);
   AddCamera(calibrate, requests.camera);
   AddTilt(calibrate, requests.tilt);
+  AddTarget(calibrate, requests.target);
+  AddRig(calibrate, requests.rig);
   return calibrate;
 }
 
 ExitCode RunCalibrate(const CLI::App& calibrate,
                       const CalibrateRequests& requests,
                       const Console& console) {
-  return calibrate.got_subcommand("camera") ? RunCalibrateCamera(requests.camera, console)
-                                            : RunCalibrateTilt(requests.tilt, console);
+  if (calibrate.got_subcommand("camera")) return RunCalibrateCamera(requests.camera, console);
+  if (calibrate.got_subcommand("tilt")) return RunCalibrateTilt(requests.tilt, console);
+  if (calibrate.got_subcommand("target")) return RunCalibrateTarget(requests.target, console);
+  return RunCalibrateRig(requests.rig, console);
 }
 
 }  // namespace tbm

@@ -12,9 +12,11 @@ namespace tbm {
 struct CalibrateRequests {
   CalibrateCameraRequest camera;
   CalibrateTiltRequest tilt;
+  CalibrateTargetRequest target;
+  CalibrateRigRequest rig;
 };
 
-// Adds `calibrate` with its commands camera and tilt.
+// Adds `calibrate` with its commands camera, tilt, target and rig.
 CLI::App* AddCalibrate(CLI::App& app, CalibrateRequests& requests);
 
 // Runs the one that was parsed; `calibrate` is what AddCalibrate returned.

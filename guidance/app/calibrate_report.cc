@@ -4,19 +4,13 @@
 #include <cmath>
 #include <iterator>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "pose/base/angle.h"
+#include "pose/rig/rig_text.h"
 
 namespace tbm {
 namespace {
-
-// A string of JSON is one of YAML too.
-std::string InQuotes(const std::string& text) {
-  return nlohmann::json(text).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
-}
 
 template <class Matrix>
 std::string RowByRow(const Matrix& matrix, const char* format) {
@@ -34,7 +28,7 @@ std::string LeftOut(const CameraCalibration& found, const FoundBoards& boards) {
   std::string list;
   for (std::size_t i = 0; i < found.pictures.size(); ++i) {
     if (found.pictures[i].used) continue;
-    list += (list.empty() ? "" : ", ") + InQuotes(boards.pictures[i].name);
+    list += (list.empty() ? "" : ", ") + YamlText(boards.pictures[i].name);
   }
   return "[" + list + "]";
 }
@@ -45,48 +39,21 @@ std::size_t UsedPictures(const CameraCalibration& found) {
   return used;
 }
 
-double LargestSigma_rad(const Eigen::Matrix3d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);
-  return std::sqrt(axes.eigenvalues()[2]);
-}
-
 }  // namespace
 
 std::string CameraYaml(const CameraCalibration& found,
                        const FoundBoards& boards,
                        const std::string& board) {
-  const CameraModel& c = found.camera;
   const IntrinsicVector sigma = found.covariance.diagonal().cwiseSqrt();
   const bool has_k3 = sigma(8) > 0.0;
-  std::string text = "camera:\n";
+  Rig rig;
+  rig.camera = found.camera;
+  rig.calibration_residual_px = found.residual_px;
+  rig.intrinsics_sigma_px = sigma.head<4>();
+  std::string text = CameraSectionYaml(rig);
   const auto add = [&text](const auto& line) { text += line; };
-  add(fmt::format("  image_width: {}\n  image_height: {}\n  distortion_model: plumb_bob\n",
-                  c.image_width_px,
-                  c.image_height_px));
-  add(
-      fmt::format("  camera_matrix: {{rows: 3, cols: 3, data: [{:.6f}, 0.0, {:.6f}, 0.0, {:.6f}, "
-                  "{:.6f}, 0.0, 0.0, 1.0]}}\n",
-                  c.fx_px,
-                  c.cx_px,
-                  c.fy_px,
-                  c.cy_px));
-  add(
-      fmt::format("  distortion_coefficients: {{rows: 1, cols: 5, data: [{:.9f}, {:.9f}, {:.9f}, "
-                  "{:.9f}, {:.9f}]}}   # k1 k2 p1 p2 k3\n",
-                  c.k1,
-                  c.k2,
-                  c.p1,
-                  c.p2,
-                  c.k3));
-  add(fmt::format("  residual_px: {:.5f}          # sigma of one coordinate of a point\n",
-                  found.residual_px));
-  add(fmt::format("  intrinsics_sigma_px: [{:.5f}, {:.5f}, {:.5f}, {:.5f}]   # fx fy cx cy\n",
-                  sigma(0),
-                  sigma(1),
-                  sigma(2),
-                  sigma(3)));
   add("# What these numbers rest on. No part of a rig file.\ncalibrated:\n");
-  add(fmt::format("  board: {}\n", InQuotes(board)));
+  add(fmt::format("  board: {}\n", YamlText(board)));
   add(fmt::format("  pictures: {}\n  left_out: {}\n  degrees_of_freedom: {}\n",
                   UsedPictures(found),
                   LeftOut(found, boards),
@@ -149,17 +116,13 @@ std::string CameraSummary(const CameraCalibration& found, const FoundBoards& boa
 
 std::string TiltYaml(const TiltResult& result) {
   const TiltRotation& found = result.rotation;
-  const Eigen::Matrix3d housing_from_camera = found.camera_from_housing.transpose();
   const double per_rad = RadToDeg(1.0);
-  std::string text = "inclinometers:\n  camera:\n";
-  text += "    # row by row, from the camera's frame into the housing's own\n    rotation: " +
-          RowByRow(housing_from_camera, "{:.9f}") + "\n";
-  if (result.sign[0] != 1.0 || result.sign[1] != 1.0) {
-    text += fmt::format("    sign: [{:+.0f}, {:+.0f}]\n", result.sign[0], result.sign[1]);
-  }
-  text += fmt::format("    sigma_deg: {}\n    mounting_sigma_deg: {:.5f}\n",
-                      result.sigma_deg,
-                      RadToDeg(LargestSigma_rad(found.covariance)));
+  TiltMount mount;
+  mount.tilt_from_body = found.camera_from_housing.transpose();
+  mount.sign = {result.sign[0], result.sign[1]};
+  mount.sigma_rad = DegToRad(result.sigma_deg);
+  mount.mounting_sigma_rad = MountingSigma_rad(found.covariance, mount.tilt_from_body);
+  std::string text = "inclinometers:\n  camera:\n" + TiltMountYaml(mount);
   text += "# What these numbers rest on. No part of a rig file.\ncalibrated:\n";
   text += fmt::format(
       "  pictures: {}\n  board_residual_px: {:.4f}\n  chi2: {:.2f}\n  "
@@ -170,6 +133,12 @@ std::string TiltYaml(const TiltResult& result) {
       found.dof);
   text += "  # of the turn that is still missing, about the camera's axes\n  covariance_deg2: " +
           RowByRow(Eigen::Matrix3d(per_rad * per_rad * found.covariance), "{:.6e}") + "\n";
+  const CameraModel& c = result.camera;
+  text += fmt::format("  camera_px: [{}, {}, {}, {}]   # fx fy cx cy of the camera's file\n",
+                      c.fx_px,
+                      c.fy_px,
+                      c.cx_px,
+                      c.cy_px);
   text += "  up_in_board: " + RowByRow(found.up_in_board.transpose().eval(), "{:.9f}") + "\n";
   if (!result.up_was_given) {
     text += fmt::format("  up_sigma_deg: {:.5f}\n", RadToDeg(found.up_sigma_rad));

@@ -23,6 +23,7 @@ struct TiltResult {
   std::vector<double> sign;  // as in a rig file
   std::size_t pictures = 0;
   double residual_px = 0.0;
+  CameraModel camera;  // that it was found with
   bool up_was_given = false;
 };
 std::string TiltYaml(const TiltResult& result);

@@ -46,8 +46,12 @@ std::optional<std::vector<CalibrationTilt>> Tilts(const CalibrateTiltRequest& re
     Complain(console, text.error().Text());
     return std::nullopt;
   }
-  auto tilts = ParseCalibrationTilts(
-      std::move(text).value(), file, request.sigma_deg, request.sign[0], request.sign[1]);
+  auto tilts = ParseCalibrationTilts(std::move(text).value(),
+                                     file,
+                                     kTiltOfPicture,
+                                     request.sigma_deg,
+                                     request.sign[0],
+                                     request.sign[1]);
   if (tilts) return std::move(tilts).value();
   Complain(console, tilts.error());
   return std::nullopt;
@@ -166,7 +170,7 @@ std::optional<FoundBoards> Boards(const CalibrateTiltRequest& request,
                                   const CameraModel& camera,
                                   const Console& console) {
   std::vector<std::string> names;
-  for (const CalibrationTilt& tilt : tilts) names.push_back(tilt.image);
+  for (const CalibrationTilt& tilt : tilts) names.push_back(tilt.name);
   auto boards = FindBoards(request.folder,
                            names,
                            board,
@@ -216,6 +220,7 @@ ExitCode RunCalibrateTilt(const CalibrateTiltRequest& request, const Console& co
                           request.sign,
                           placements.placed.size(),
                           placements.residual_px,
+                          *camera,
                           options->up_in_board.has_value()};
   if (const auto fault = out.Write(TiltYaml(result))) {
     Complain(console, *fault);

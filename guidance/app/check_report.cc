@@ -14,6 +14,10 @@ namespace {
 constexpr std::array<const char*, 4> kQuantities = {"dx", "dy", "dz", "distance"};
 constexpr std::array<const char*, 4> kColours = {"#c0392b", "#27803f", "#1f5fa8", "#333333"};
 
+ReportFolder FolderOf(const CheckRequest& request) {
+  return {request.report, "check", request.force};
+}
+
 }  // namespace
 
 Spreads::Spreads(const std::vector<Eigen::Vector3d>& differences_mm) {
@@ -93,30 +97,23 @@ std::string PanelsScript(const Spreads& spreads,
 }
 
 std::optional<std::string> ReportObstacle(const CheckRequest& request) {
-  if (request.report.empty()) return std::nullopt;
-  if (auto fault = MakeFolder(request.report)) return fault;
-  for (const char* name : {"check.csv", "check.json", "check.png"}) {
-    if (auto fault = OutputFile(request.report + "/" + name, request.force).Obstacle()) {
-      return fault;
-    }
-  }
-  return std::nullopt;
+  return FolderOf(request).Obstacle({"csv", "json", "png"});
 }
 
 ExitCode WriteReport(const CheckReport& report,
                      const CheckRequest& request,
                      const Console& console) {
-  const std::string base = request.report + "/check.";
+  const ReportFolder folder = FolderOf(request);
   for (const auto& [ending, text] :
        {std::pair("csv", &report.csv), std::pair("json", &report.json)}) {
-    if (const auto fault = OutputFile(base + ending, request.force).Write(*text)) {
+    if (const auto fault = folder.File(ending).Write(*text)) {
       Complain(console, *fault);
       return ExitCode::kBadInput;
     }
   }
   // The figures are complete without the picture.
-  if (const auto fault =
-          DrawPicture(report.plot, 1000, report.height_px, base + "png", request.force)) {
+  if (const auto fault = DrawPicture(
+          report.plot, 1000, report.height_px, folder.File("png").path(), request.force)) {
     Complain(console, *fault);
   }
   return ExitCode::kDone;

@@ -90,6 +90,20 @@ std::optional<std::string> GrowingOutputFile::Commit() {
   return Told(error);
 }
 
+OutputFile ReportFolder::File(std::string_view ending) const {
+  return {fmt::format("{}/{}.{}", folder_, name_, ending), may_replace_};
+}
+
+std::optional<std::string> ReportFolder::Obstacle(
+    std::initializer_list<std::string_view> endings) const {
+  if (!is_wanted()) return std::nullopt;
+  if (auto fault = MakeFolder(folder_)) return fault;
+  for (const std::string_view ending : endings) {
+    if (auto fault = File(ending).Obstacle()) return fault;
+  }
+  return std::nullopt;
+}
+
 std::optional<std::string> MakeFolder(const std::string& path) {
   std::error_code error;
   fs::create_directories(path, error);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <initializer_list>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -49,6 +50,26 @@ class GrowingOutputFile {
   std::string beside_;
   bool may_replace_;
   SyncedFile file_;
+};
+
+// A folder with a command's results under one name: report/check.csv, report/check.json, ..
+class ReportFolder {
+ public:
+  // Without a folder there is no report, and nothing stops it.
+  ReportFolder(std::string folder, std::string name, bool may_replace)
+      : folder_(std::move(folder)), name_(std::move(name)), may_replace_(may_replace) {}
+
+  bool is_wanted() const { return !folder_.empty(); }
+  OutputFile File(std::string_view ending) const;
+
+  // Makes the folder. Everything that would stop one of the files is found before anything of them
+  // is written.
+  std::optional<std::string> Obstacle(std::initializer_list<std::string_view> endings) const;
+
+ private:
+  std::string folder_;
+  std::string name_;
+  bool may_replace_;
 };
 
 // Makes a folder for several results. Empty when it is there afterwards.

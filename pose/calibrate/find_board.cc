@@ -13,6 +13,8 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "pose/calibrate/grey_mat.h"
+
 namespace tbm {
 namespace {
 
@@ -21,20 +23,6 @@ using Pixels = std::vector<Eigen::Vector2d>;
 
 constexpr int kLeastSide_px = 16;
 constexpr double kLeastDistance_px = 5.0;
-
-cv::Mat GreyOf(const ImageView& image) {
-  const int type = image.bytes_per_pixel == 1 ? CV_8UC1 : CV_16UC1;
-  // OpenCV has no Mat of const pixels; nothing below writes into this one.
-  const cv::Mat all(image.height_px,
-                    image.width_px,
-                    type,
-                    const_cast<void*>(image.pixels),
-                    static_cast<std::size_t>(image.stride_bytes));
-  if (image.bytes_per_pixel == 1 && image.max_value == 255) return all;
-  cv::Mat grey;
-  all.convertTo(grey, CV_8U, 255.0 / static_cast<double>(image.max_value));
-  return grey;
-}
 
 // From each point to its nearest neighbour.
 std::vector<double> NearestDistances(const CvPoints& points) {

@@ -2,54 +2,28 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 
-#include "pose/geometry/rigid3.h"
+#include "pose/calibrate/target_fit.h"
 
 namespace tbm {
 namespace {
 
 constexpr int kIterations = 20;
-constexpr double kMostSigmas = 5.0;
+// Three coordinates of one point: once in 70 000 by chance.
+constexpr double kMostMisfit = 25.0;
+// An error of a point shows by less than this share in its residual: nothing controls it.
+constexpr double kLeastControl = 0.02;
 
-// The rigid transform that brings `from` onto `to` with the least squares (Kabsch), and by how much
-// the second largest extent of `from` differs from none.
-struct RigidFit {
-  Rigid3 to_from;
-  double breadth_m = 0.0;
-  double worst_m = 0.0;
-};
-
-RigidFit FitRigid(const std::vector<Eigen::Vector3d>& from,
-                  const std::vector<Eigen::Vector3d>& to) {
-  const auto count = static_cast<double>(from.size());
-  Eigen::Vector3d from_mean = Eigen::Vector3d::Zero();
-  Eigen::Vector3d to_mean = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    from_mean += from[i] / count;
-    to_mean += to[i] / count;
-  }
-  Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    cross += (to[i] - to_mean) * (from[i] - from_mean).transpose();
-    scatter += (from[i] - from_mean) * (from[i] - from_mean).transpose() / count;
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d flip = Eigen::Matrix3d::Identity();
-  flip(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
-  RigidFit fit;
-  fit.to_from.rotation =
-      Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * flip * svd.matrixV().transpose()));
-  fit.to_from.translation = to_mean - fit.to_from.rotation * from_mean;
-  fit.breadth_m = std::sqrt(scatter.jacobiSvd().singularValues()[1]);
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    fit.worst_m = std::max(fit.worst_m, (fit.to_from * from[i] - to[i]).norm());
-  }
-  return fit;
+// chi2 over its degrees of freedom where that is more than chance, else 1.
+double Factor2(double chi2, int dof) {
+  if (dof <= 0) return 1.0;
+  const double ratio = chi2 / dof;
+  return ratio > 1.0 + 3.0 * std::sqrt(2.0 / dof) ? ratio : 1.0;
 }
 
 // Unknowns: three for each LED, then turn (about the site's axes) and shift for each placement.
@@ -71,41 +45,82 @@ class Adjustment {
       if (step.norm() < 1e-14) break;
     }
     Fill();
+    spread_ = information_.inverse();
   }
 
   TargetCalibration Found() const {
     TargetCalibration result;
     result.led_in_target_m = leds_;
-    const Eigen::MatrixXd spread = information_.inverse();
-    for (std::size_t j = 0; j < leds_.size(); ++j) {
-      const auto row = static_cast<Eigen::Index>(3 * j);
-      result.led_sigma_m.push_back(std::sqrt(spread.block<3, 3>(row, row).trace() / 3.0));
-    }
-    int observed = 0;
+    result.site_from_target = site_from_target_;
     for (std::size_t i = 0; i < placements_.size(); ++i) {
       for (std::size_t j = 0; j < leds_.size(); ++j) {
-        const auto& measured = placements_[i].led_in_site_m[j];
-        if (!measured) continue;
-        observed += 3;
-        const double off = (site_from_target_[i] * leds_[j] - *measured).norm();
-        const double sigmas = off / placements_[i].sigma_m;
+        if (!placements_[i].led_in_site_m[j]) continue;
+        result.sightings.push_back(Sighting(i, j));
+        const double sigmas = result.sightings.back().off_in_site_m.norm() / placements_[i].sigma_m;
         result.chi2 += sigmas * sigmas;
-        if (sigmas <= result.worst_sigmas) continue;
-        result.worst_sigmas = sigmas;
-        result.worst_led = j;
-        result.worst_placement = i;
       }
     }
     // Six of the unknowns are the frame, which the constraints hold.
-    result.dof = observed - static_cast<int>(3 * leds_.size() + 6 * placements_.size()) + 6;
+    result.dof =
+        static_cast<int>(3 * result.sightings.size() - 3 * leds_.size() - 6 * placements_.size()) +
+        6;
+    result.sigma_factor = std::sqrt(Factor2(result.chi2, result.dof));
+    for (std::size_t j = 0; j < leds_.size(); ++j) {
+      const Eigen::Index row = LedAt(j);
+      result.led_sigma_m.push_back(result.sigma_factor *
+                                   std::sqrt(spread_.block<3, 3>(row, row).trace() / 3.0));
+    }
     return result;
   }
 
-  const std::vector<Rigid3>& site_from_target() const { return site_from_target_; }
+  // Of a placement's two turns that move up.
+  double UpSigma_rad(std::size_t i) const {
+    const Eigen::Index p = PlacementAt(i);
+    return std::sqrt(spread_.block<2, 2>(p, p).trace() / 2.0);
+  }
 
  private:
+  Eigen::Index LedAt(std::size_t j) const { return static_cast<Eigen::Index>(3 * j); }
   Eigen::Index PlacementAt(std::size_t i) const {
     return static_cast<Eigen::Index>(3 * leds_.size() + 6 * i);
+  }
+
+  Eigen::Matrix<double, 3, 6> ByPlacement(std::size_t i, std::size_t j) const {
+    Eigen::Matrix<double, 3, 6> by_placement;
+    by_placement.leftCols<3>() = -Skew(site_from_target_[i].rotation * leds_[j]);
+    by_placement.rightCols<3>().setIdentity();
+    return by_placement;
+  }
+
+  // Which share of an error of this point shows in its residual: one less what the point itself
+  // says of the unknowns.
+  Eigen::Matrix3d Control(std::size_t i, std::size_t j) const {
+    const Eigen::Index l = LedAt(j);
+    const Eigen::Index p = PlacementAt(i);
+    const Eigen::Matrix3d by_led = site_from_target_[i].rotation.toRotationMatrix();
+    const Eigen::Matrix<double, 3, 6> by_placement = ByPlacement(i, j);
+    const Eigen::Matrix3d mixed = by_led * spread_.block<3, 6>(l, p) * by_placement.transpose();
+    const Eigen::Matrix3d adjusted =
+        by_led * spread_.block<3, 3>(l, l) * by_led.transpose() + mixed + mixed.transpose() +
+        by_placement * spread_.block<6, 6>(p, p) * by_placement.transpose();
+    const double sigma_m = placements_[i].sigma_m;
+    return Eigen::Matrix3d::Identity() - adjusted / (sigma_m * sigma_m);
+  }
+
+  TargetSighting Sighting(std::size_t i, std::size_t j) const {
+    TargetSighting sighting{i, j, Off(i, j), 0.0, 0.0};
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> control(Control(i, j));
+    if (control.eigenvalues()[0] < kLeastControl) return sighting;
+    const Eigen::Vector3d along = control.eigenvectors().transpose() * sighting.off_in_site_m;
+    const double sigma_m = placements_[i].sigma_m;
+    sighting.misfit =
+        along.cwiseAbs2().cwiseQuotient(control.eigenvalues()).sum() / (sigma_m * sigma_m);
+    sighting.from_others_m = along.cwiseQuotient(control.eigenvalues()).norm();
+    return sighting;
+  }
+
+  Eigen::Vector3d Off(std::size_t i, std::size_t j) const {
+    return *placements_[i].led_in_site_m[j] - site_from_target_[i] * leds_[j];
   }
 
   void Fill() {
@@ -119,13 +134,10 @@ class Adjustment {
       const Eigen::Matrix3d rotation = site_from_target_[i].rotation.toRotationMatrix();
       const Eigen::Index p = PlacementAt(i);
       for (std::size_t j = 0; j < leds_.size(); ++j) {
-        const auto& measured = placements_[i].led_in_site_m[j];
-        if (!measured) continue;
-        const auto l = static_cast<Eigen::Index>(3 * j);
-        Eigen::Matrix<double, 3, 6> by_placement;
-        by_placement.leftCols<3>() = -Skew(rotation * leds_[j]);
-        by_placement.rightCols<3>().setIdentity();
-        const Eigen::Vector3d off = *measured - site_from_target_[i] * leds_[j];
+        if (!placements_[i].led_in_site_m[j]) continue;
+        const Eigen::Index l = LedAt(j);
+        const Eigen::Matrix<double, 3, 6> by_placement = ByPlacement(i, j);
+        const Eigen::Vector3d off = Off(i, j);
         information_.block<3, 3>(l, l) += weight * Eigen::Matrix3d::Identity();
         information_.block<6, 6>(p, p) += weight * by_placement.transpose() * by_placement;
         const Eigen::Matrix<double, 3, 6> mixed = weight * rotation.transpose() * by_placement;
@@ -156,9 +168,7 @@ class Adjustment {
   }
 
   void Move(const Eigen::VectorXd& step) {
-    for (std::size_t j = 0; j < leds_.size(); ++j) {
-      leds_[j] += step.segment<3>(static_cast<Eigen::Index>(3 * j));
-    }
+    for (std::size_t j = 0; j < leds_.size(); ++j) leds_[j] += step.segment<3>(LedAt(j));
     for (std::size_t i = 0; i < placements_.size(); ++i) {
       const PoseError e = step.segment<6>(PlacementAt(i));
       site_from_target_[i] = Moved(site_from_target_[i], e);
@@ -170,40 +180,72 @@ class Adjustment {
   std::vector<Eigen::Vector3d> leds_;
   std::vector<Rigid3> site_from_target_;
   Eigen::MatrixXd information_;
+  Eigen::MatrixXd spread_;
   Eigen::VectorXd pull_;
 };
 
+// The point that does not belong to the others, if there is one.
+std::optional<TargetCalibrationFailure> Outlier(const TargetCalibration& found) {
+  const auto worst = std::max_element(
+      found.sightings.begin(),
+      found.sightings.end(),
+      [](const TargetSighting& a, const TargetSighting& b) { return a.misfit < b.misfit; });
+  // Where all points scatter more than was declared, it is the declaration that is wrong.
+  const double rest = Factor2(found.chi2 - worst->misfit, found.dof - 3);
+  if (!(worst->misfit > kMostMisfit * rest)) return {};
+  TargetCalibrationFailure failure;
+  failure.fault = TargetCalibrationFault::kDoesNotFit;
+  failure.led = worst->led;
+  failure.placement = worst->placement;
+  failure.off_m = worst->from_others_m;
+  for (const TargetSighting& other : found.sightings) {
+    const bool is_as_bad = other.misfit > worst->misfit - 1.0;
+    if (other.led == worst->led && other.placement != worst->placement && is_as_bad) {
+      failure.or_placement = other.placement;
+    }
+  }
+  return failure;
+}
+
 // The inclinometer feels the site's plumb line, which the total station knows.
 void FindMounting(std::span<const TargetPlacement> placements,
-                  const std::vector<Rigid3>& site_from_target,
+                  const Adjustment& adjustment,
                   TargetCalibration* result) {
   std::vector<TiltPlacement> tilted;
   for (std::size_t i = 0; i < placements.size(); ++i) {
     if (!placements[i].up_in_housing) continue;
     TiltPlacement one;
-    one.camera_from_board = site_from_target[i].rotation.conjugate().toRotationMatrix();
+    one.camera_from_board = result->site_from_target[i].rotation.conjugate().toRotationMatrix();
     one.up_in_housing = *placements[i].up_in_housing;
     one.tilt_sigma_rad = placements[i].tilt_sigma_rad;
-    // How well the LEDs' coordinates hold the board's attitude.
-    one.camera_sigma_rad = placements[i].sigma_m / 0.3;
+    one.camera_sigma_rad = result->sigma_factor * adjustment.UpSigma_rad(i);
     tilted.push_back(one);
   }
   TiltRotationOptions options;
   options.up_in_board = Eigen::Vector3d::UnitZ();
   const auto rotation = FindTiltRotation(tilted, options);
   if (!rotation) {
-    result->mounting_missing = rotation.error().fault;
+    result->mounting_missing = rotation.error();
     return;
   }
   result->housing_from_target = rotation->camera_from_housing.transpose();
-  result->mounting_covariance = rotation->covariance;
+  result->mounting_covariance = Factor2(rotation->chi2, rotation->dof) * rotation->covariance;
 }
 
-Failure<TargetCalibrationFailure> Fail(TargetCalibrationFault fault,
-                                       std::size_t led,
-                                       std::size_t placement,
-                                       double off_m = 0.0) {
-  return Failure{TargetCalibrationFailure{fault, led, placement, off_m}};
+std::optional<TargetCalibrationFailure> Unmeasured(std::size_t leds,
+                                                   std::span<const TargetPlacement> placements) {
+  TargetCalibrationFailure failure;
+  if (placements.empty()) return failure;
+  for (std::size_t j = 0; j < leds; ++j) {
+    const auto has_it = [j](const TargetPlacement& one) {
+      return one.led_in_site_m[j].has_value();
+    };
+    if (std::any_of(placements.begin(), placements.end(), has_it)) continue;
+    failure.fault = TargetCalibrationFault::kNeverMeasured;
+    failure.led = j;
+    return failure;
+  }
+  return {};
 }
 
 }  // namespace
@@ -213,39 +255,23 @@ Result<TargetCalibration, TargetCalibrationFailure> CalibrateTarget(
     std::span<const TargetPlacement> placements,
     double most_off_m) {
   std::vector<Rigid3> starts;
-  std::vector<bool> is_seen(nominal_m.size(), false);
   for (std::size_t i = 0; i < placements.size(); ++i) {
-    std::vector<Eigen::Vector3d> from;
-    std::vector<Eigen::Vector3d> to;
-    for (std::size_t j = 0; j < nominal_m.size(); ++j) {
-      if (!placements[i].led_in_site_m[j]) continue;
-      is_seen[j] = true;
-      from.push_back(nominal_m[j]);
-      to.push_back(*placements[i].led_in_site_m[j]);
+    const auto start = StartTarget(nominal_m, placements[i].led_in_site_m, most_off_m);
+    if (!start) {
+      TargetCalibrationFailure failure = start.error();
+      failure.placement = i;
+      return Failure{std::move(failure)};
     }
-    if (from.size() < 3) return Fail(TargetCalibrationFault::kTooFewLeds, 0, i);
-    const RigidFit fit = FitRigid(from, to);
-    if (fit.breadth_m < 0.01) return Fail(TargetCalibrationFault::kOnOneLine, 0, i);
-    if (fit.worst_m > most_off_m) {
-      return Fail(TargetCalibrationFault::kOtherBoard, 0, i, fit.worst_m);
-    }
-    starts.push_back(fit.to_from);
+    starts.push_back(*start);
   }
-  const auto missing = std::find(is_seen.begin(), is_seen.end(), false);
-  if (placements.empty() || missing != is_seen.end()) {
-    return Fail(TargetCalibrationFault::kTooFewLeds,
-                static_cast<std::size_t>(missing - is_seen.begin()),
-                0);
-  }
+  if (const auto failure = Unmeasured(nominal_m.size(), placements)) return Failure{*failure};
   Adjustment adjustment(nominal_m, placements, std::move(starts));
   adjustment.Solve();
   TargetCalibration result = adjustment.Found();
-  if (result.dof > 0 && result.worst_sigmas > kMostSigmas) {
-    const double off_m = result.worst_sigmas * placements[result.worst_placement].sigma_m;
-    return Fail(
-        TargetCalibrationFault::kDoesNotFit, result.worst_led, result.worst_placement, off_m);
+  if (result.dof > 0) {
+    if (const auto outlier = Outlier(result)) return Failure{*outlier};
   }
-  FindMounting(placements, adjustment.site_from_target(), &result);
+  FindMounting(placements, adjustment, &result);
   return result;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
@@ -8,6 +9,7 @@
 
 #include "pose/base/result.h"
 #include "pose/calibrate/tilt_rotation.h"
+#include "pose/geometry/rigid3.h"
 
 namespace tbm {
 
@@ -21,26 +23,40 @@ struct TargetPlacement {
   double tilt_sigma_rad = 0.0;  // of each of its angles, > 0
 };
 
+// A measured LED against what all placements together say of it.
+struct TargetSighting {
+  std::size_t placement = 0;
+  std::size_t led = 0;
+  Eigen::Vector3d off_in_site_m = Eigen::Vector3d::Zero();  // measured minus adjusted
+  // By how much chi2 would fall without it, three degrees of freedom, and how far it is from where
+  // all others put it; 0 where nothing controls it.
+  double misfit = 0.0;
+  double from_others_m = 0.0;
+};
+
 struct TargetCalibration {
   std::vector<Eigen::Vector3d> led_in_target_m;
   std::vector<double> led_sigma_m;  // of one coordinate, the frame being that of all LEDs together
-  double chi2 = 0.0;                // of the LEDs
-  int dof = 0;
-  // The LED and placement that fit worst, and by how many sigma.
-  std::size_t worst_led = 0;
-  std::size_t worst_placement = 0;
-  double worst_sigmas = 0.0;
+  std::vector<Rigid3> site_from_target;  // of each placement
+  std::vector<TargetSighting> sightings;
+  double chi2 = 0.0;  // of the LEDs
+  int dof = 0;        // 0: one placement, nothing controls it
+  // By this the points scatter more than was declared; every sigma here is multiplied with it.
+  double sigma_factor = 1.0;
   // How the housing is built to the board; empty where no placement was tilted enough.
   std::optional<Eigen::Matrix3d> housing_from_target;
   Eigen::Matrix3d mounting_covariance = Eigen::Matrix3d::Zero();  // [rad2], about the board's axes
-  std::optional<TiltRotationFault> mounting_missing;              // why it is empty
+  std::optional<TiltRotationFailure> mounting_missing;            // why it is empty
 };
 
 enum class TargetCalibrationFault {
-  kTooFewLeds,  // a placement with fewer than three LEDs, or an LED that was never measured
-  kOnOneLine,   // LEDs of a placement stand on one line: how it was turned is not known
-  kDoesNotFit,  // an LED or a placement is off by more than measuring explains
-  kOtherBoard,  // the LEDs are not where the nominal ones are, by any placement
+  kTooFewLeds,     // a placement with fewer than three LEDs
+  kNeverMeasured,  // an LED that stands in no placement
+  kOnOneLine,      // LEDs of a placement stand on one line: how it was turned is not known
+  kExchanged,      // points of a placement carry one another's names
+  kMirrored,       // the points are a mirror image of the board: two of the columns exchanged
+  kDoesNotFit,     // one LED in one placement is off by more than measuring explains
+  kOtherBoard,     // the LEDs are not where the nominal ones are, by any placement
 };
 
 struct TargetCalibrationFailure {
@@ -48,6 +64,10 @@ struct TargetCalibrationFailure {
   std::size_t led = 0;        // the one meant, by its place in the list
   std::size_t placement = 0;  // the same
   double off_m = 0.0;         // kDoesNotFit, kOtherBoard: by how much
+  // kDoesNotFit: two placements contradict each other, and it may be this one as well.
+  std::optional<std::size_t> or_placement;
+  std::vector<std::size_t> really;  // kExchanged: which LED the point with each LED's name is
+  double scale = 1.0;               // kOtherBoard: size of what was measured by that of the board
 };
 
 // LED coordinates and the inclinometer's mounting from total-station points. The target frame stays

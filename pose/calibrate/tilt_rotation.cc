@@ -114,7 +114,6 @@ Normal NormalOf(std::span<const TiltPlacement> placements,
 
 // Which motion the placements lack, judged by what the sensors saw.
 std::optional<TiltRotationFault> MissingIn(std::span<const TiltPlacement> placements,
-                                           const Eigen::Vector3d& up_in_board,
                                            bool up_is_given) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const TiltPlacement& one : placements) mean += one.up_in_housing;
@@ -131,7 +130,12 @@ std::optional<TiltRotationFault> MissingIn(std::span<const TiltPlacement> placem
   if (std::sqrt(std::max(axes.eigenvalues()[0], 0.0)) < kLeastTilt_rad) {
     return TiltRotationFault::kOneAxis;
   }
-  // Turn about the plumb line from the first placement to each other one.
+  return {};
+}
+
+// How far the placements are turned about the plumb line, in all.
+double YawSpread_rad(std::span<const TiltPlacement> placements,
+                     const Eigen::Vector3d& up_in_board) {
   double least = 0.0;
   double most = 0.0;
   for (const TiltPlacement& one : placements) {
@@ -141,8 +145,7 @@ std::optional<TiltRotationFault> MissingIn(std::span<const TiltPlacement> placem
     least = std::min(least, yaw);
     most = std::max(most, yaw);
   }
-  if (most - least < kLeastYaw_rad) return TiltRotationFault::kNoYaw;
-  return {};
+  return most - least;
 }
 
 TiltRotationFailure FailureOf(TiltRotationFault fault,
@@ -171,6 +174,15 @@ const char* MissingMotion(TiltRotationFault fault) {
              "picture";
   }
   return "";
+}
+
+double MountingSigma_rad(const Eigen::Matrix3d& covariance,
+                         const Eigen::Matrix3d& housing_from_body,
+                         double lean_rad) {
+  const Eigen::Matrix3d in_housing = housing_from_body * covariance * housing_from_body.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> level(in_housing.topLeftCorner<2, 2>());
+  const double lean = std::sin(lean_rad);
+  return std::sqrt(level.eigenvalues()[1] + lean * lean * in_housing(2, 2));
 }
 
 Eigen::Matrix3d StartTiltRotation(std::span<const TiltPlacement> placements) {
@@ -225,7 +237,7 @@ Result<TiltRotation, TiltRotationFailure> FindTiltRotation(
         AugmentedLagrangianTiltRotation(placements, StartTiltRotation(placements), &found.steps);
     found.up_in_board = MeanUp(placements, found.camera_from_housing);
   }
-  if (const auto missing = MissingIn(placements, found.up_in_board, up_is_given)) {
+  if (const auto missing = MissingIn(placements, up_is_given)) {
     return Failure{FailureOf(*missing)};
   }
   Normal normal;
@@ -249,7 +261,10 @@ Result<TiltRotation, TiltRotationFailure> FindTiltRotation(
   }
   const double sigma_rad = std::sqrt(found.covariance.eigenvalues().real().maxCoeff());
   if (!(sigma_rad <= options.most_sigma_rad)) {
-    return Failure{FailureOf(TiltRotationFault::kTooWeak, sigma_rad)};
+    const bool lacks_yaw =
+        !up_is_given && YawSpread_rad(placements, found.up_in_board) < kLeastYaw_rad;
+    return Failure{
+        FailureOf(lacks_yaw ? TiltRotationFault::kNoYaw : TiltRotationFault::kTooWeak, sigma_rad)};
   }
   // Twelve pictures that agree are near one; a board that moved is far beyond any sigma.
   constexpr double kMostChi2PerDof = 25.0;

@@ -61,6 +61,13 @@ struct TiltRotationOptions {
 Result<TiltRotation, TiltRotationFailure> FindTiltRotation(
     std::span<const TiltPlacement> placements, const TiltRotationOptions& options);
 
+// What a rig file calls the sigma of a mounting: of up in the body, along its worse direction,
+// while the housing leans by `lean_rad` at the most. A turn of the housing about its own z axis,
+// which tilts find worst, moves up only as far as it leans. `covariance` is about the body's axes.
+double MountingSigma_rad(const Eigen::Matrix3d& covariance,
+                         const Eigen::Matrix3d& housing_from_body,
+                         double lean_rad = 0.1745);  // 10 degrees
+
 // The parts, for tests and comparison. `Start...`: the rotation next to the null vector of the
 // paper's A. `AugmentedLagrangian`: from any start; `steps` counts.
 Eigen::Matrix3d StartTiltRotation(std::span<const TiltPlacement> placements);

@@ -5,12 +5,6 @@
 namespace tbm {
 namespace {
 
-YamlNode Section(const YamlNode& parent, std::string_view name, std::string_view hint) {
-  YamlNode section = parent.Required(name, hint);
-  if (section.exists() && !section.IsMap()) section.Fault(fmt::format("must be a map {}", hint));
-  return section;
-}
-
 void ReadDistortionModel(const YamlNode& camera) {
   // OpenCV's own files have no such key; with four or five coefficients they mean the same model.
   const YamlNode node = camera.Optional("distortion_model");
@@ -112,9 +106,9 @@ bool ReadCameraModel(const YamlNode& camera, const KnownKeys& known, CameraModel
       camera.Required("image_height", "rows, 16 .. 32768").Integer(16, 32768).value_or(0);
   ReadDistortionModel(camera);
   const bool has_matrix = ReadMatrix(
-      Section(camera, "camera_matrix", "with `data`, nine numbers row by row"), known, model);
+      SectionOf(camera, "camera_matrix", "with `data`, nine numbers row by row"), known, model);
   const bool has_lens = ReadCoefficients(
-      Section(camera, "distortion_coefficients", "with `data`, k1 k2 p1 p2 k3"), known, model);
+      SectionOf(camera, "distortion_coefficients", "with `data`, k1 k2 p1 p2 k3"), known, model);
   if (!has_matrix || !has_lens || model->image_width_px <= 0 || model->image_height_px <= 0) {
     return false;
   }

@@ -157,4 +157,10 @@ void YamlNode::Fault(std::string what) const {
   if (faults_->size() < kMostFaults) faults_->push_back({file_, line_, key_, std::move(what)});
 }
 
+YamlNode SectionOf(const YamlNode& parent, std::string_view name, std::string_view hint) {
+  YamlNode section = parent.Required(name, hint);
+  if (section.exists() && !section.IsMap()) section.Fault(fmt::format("must be a map {}", hint));
+  return section;
+}
+
 }  // namespace tbm

@@ -57,4 +57,7 @@ class YamlNode {
   int line_ = 0;
 };
 
+// A member that must be there and be a map of keys; `hint` says what belongs into it.
+YamlNode SectionOf(const YamlNode& parent, std::string_view name, std::string_view hint);
+
 }  // namespace tbm

@@ -11,11 +11,14 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
 
 namespace tbm {
 namespace {
 
+using test::Outcome;
+using test::Ran;
 using test::ReadText;
 using test::TempFolder;
 using test::WriteText;
@@ -30,20 +33,6 @@ Request For(const AxisSource& source) {
   Request request;
   request.source = source;
   return request;
-}
-
-struct Outcome {
-  ExitCode code;
-  std::string out;
-  std::string err;
-};
-
-template <class Request>
-Outcome Ran(ExitCode (*command)(const Request&, const Console&), const Request& request) {
-  std::ostringstream out;
-  std::ostringstream err;
-  const ExitCode code = command(request, {out, err});
-  return {code, out.str(), err.str()};
 }
 
 using Row = std::map<std::string, std::string>;

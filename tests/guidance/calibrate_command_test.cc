@@ -19,9 +19,10 @@
 #include "guidance/config/camera_file.h"
 #include "pose/base/angle.h"
 #include "pose/calibrate/view_fit.h"
-#include "pose/geometry/tilt.h"
 #include "pose/rig/rig_file.h"
 #include "tests/support/board_picture.h"
+#include "tests/support/calibration_data.h"
+#include "tests/support/command.h"
 #include "tests/support/random.h"
 #include "tests/support/temp_folder.h"
 
@@ -29,8 +30,8 @@ namespace tbm {
 namespace {
 
 using test::BoardCamera;
-using test::BoardPainter;
-using test::GoodPlacements;
+using test::Outcome;
+using test::Ran;
 using test::Random;
 using test::ReadText;
 using test::TempFolder;
@@ -42,21 +43,7 @@ using ::testing::StartsWith;
 
 namespace fs = std::filesystem;
 
-const std::string kBoard = "chessboard:9x6:25";
-const Board kChess = *ParseBoard(kBoard);
-
-struct Outcome {
-  ExitCode code;
-  std::string out;
-  std::string err;
-};
-template <class Request>
-Outcome Ran(ExitCode (*command)(const Request&, const Console&), const Request& request) {
-  std::ostringstream out;
-  std::ostringstream err;
-  const ExitCode code = command(request, {out, err});
-  return {code, out.str(), err.str()};
-}
+const std::string kBoard = test::kWorkshopBoard;
 
 // A folder with what a surveyor brings home: pictures/ for the camera.
 class CalibrateCamera : public ::testing::Test {
@@ -64,14 +51,7 @@ class CalibrateCamera : public ::testing::Test {
   static void SetUpTestSuite() {
     shared_ = new TempFolder;
     fs::create_directory(*shared_ / "pictures");
-    const BoardPainter painter(BoardCamera());
-    Random random("calibrate camera");
-    int number = 0;
-    for (const Rigid3& placement : GoodPlacements(kChess, BoardCamera(), 18, random)) {
-      const auto pixels = painter.Paint(kChess, placement, 2.0, random);
-      test::WritePicture(*shared_ / fmt::format("pictures/p{:02}.pgm", number++),
-                         painter.View(pixels));
-    }
+    test::MakeCameraPictures(*shared_ / "pictures");
     WriteText(*shared_ / "pictures/notes.txt", "not a picture");
   }
   static void TearDownTestSuite() {
@@ -237,48 +217,11 @@ class CalibrateTilt : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     shared_ = new TempFolder;
-    const BoardPainter painter(BoardCamera());
-    Random random("calibrate tilt");
-    std::string csv = "image,beta_deg,gamma_deg\n";
-    for (int i = 0; i < 12; ++i) {
-      const Rigid3 placement = Placement(random);
-      const auto pixels = painter.Paint(kChess, placement, 2.0, random);
-      const std::string name = fmt::format("t{:02}.pgm", i);
-      test::WritePicture(*shared_ / name, painter.View(pixels));
-      const Eigen::Vector3d up =
-          CameraFromHousing().transpose() * (placement.rotation * UpInBoard());
-      const Inclination tilt = InclinationFromUp(up);
-      csv += fmt::format("{},{:.4f},{:.4f}\n",
-                         name,
-                         RadToDeg(tilt.beta_rad) + random.Normal(0.005),
-                         RadToDeg(tilt.gamma_rad) + random.Normal(0.005));
-    }
-    WriteText(*shared_ / "tilt.csv", csv);
-    WriteText(*shared_ / "camera.yaml",
-              "camera:\n  image_width: 640\n  image_height: 480\n"
-              "  camera_matrix: {data: [612.4, 0, 323.7, 0, 611.1, 236.2, 0, 0, 1]}\n"
-              "  distortion_coefficients: {data: [-0.12, 0.07, 0.0006, -0.0004, 0]}\n");
+    test::MakeTiltPictures(shared_->path(), {});
   }
   static void TearDownTestSuite() {
     delete shared_;
     shared_ = nullptr;
-  }
-
-  // z of the housing against the line of sight, some degrees off; the floor some degrees off level.
-  static Eigen::Matrix3d CameraFromHousing() {
-    return (Eigen::AngleAxisd(DegToRad(176.0), Eigen::Vector3d::UnitX()) *
-            Eigen::AngleAxisd(DegToRad(31.0), Eigen::Vector3d::UnitZ()) *
-            Eigen::AngleAxisd(DegToRad(-3.0), Eigen::Vector3d::UnitY()))
-        .toRotationMatrix();
-  }
-  static Eigen::Vector3d UpInBoard() { return Eigen::Vector3d(0.02, -0.03, -1.0).normalized(); }
-  static Rigid3 Placement(Random& random) {
-    test::BoardPlace place;
-    place.share = 0.4;
-    place.tilt_u_deg = random.Uniform(-15.0, 15.0);
-    place.tilt_v_deg = random.Uniform(-15.0, 15.0);
-    place.roll_deg = random.Uniform(-180.0, 180.0);
-    return test::Placed(kChess, BoardCamera(), place);
   }
 
   CalibrateTiltRequest Request() const {
@@ -327,7 +270,8 @@ TEST_F(CalibrateTilt, TwelvePicturesGiveTheRotationThatTheRigFileWants) {
   const auto loaded = RigWith(ReadText(request.out));
   ASSERT_TRUE(loaded.has_value()) << loaded.error()[0].Text();
   const TiltMount& mount = loaded->rig.camera_tilt;
-  const Eigen::AngleAxisd off(Eigen::Matrix3d(mount.tilt_from_body * CameraFromHousing()));
+  const Eigen::AngleAxisd off(
+      Eigen::Matrix3d(mount.tilt_from_body * test::TiltingTable::FloorCameraFromHousing()));
   EXPECT_LT(RadToDeg(std::abs(off.angle())), 0.05);
   EXPECT_LT(std::abs(off.angle()), 4.0 * mount.mounting_sigma_rad);
   EXPECT_LT(RadToDeg(mount.mounting_sigma_rad), 0.05);
@@ -360,8 +304,8 @@ TEST_F(CalibrateTilt, GravityThatIsKnownMakesItBetterAndSignsAreTaken) {
   const auto loaded = RigWith(ReadText(turned.out));
   ASSERT_TRUE(loaded.has_value());
   EXPECT_EQ(loaded->rig.camera_tilt.sign[0], -1.0);
-  const Eigen::AngleAxisd off(
-      Eigen::Matrix3d(loaded->rig.camera_tilt.tilt_from_body * CameraFromHousing()));
+  const Eigen::AngleAxisd off(Eigen::Matrix3d(loaded->rig.camera_tilt.tilt_from_body *
+                                              test::TiltingTable::FloorCameraFromHousing()));
   EXPECT_LT(RadToDeg(std::abs(off.angle())), 0.06);
 }
 
@@ -415,7 +359,7 @@ TEST_F(CalibrateTilt, EachFaultOfItsTableIsNamedWithLineAndColumn) {
   }
   // All faults are said at once.
   const auto faults = ParseCalibrationTilts(
-      "image,beta_deg,gamma_deg\na,x,1\nb,1,y\n", "tilt.csv", 0.005, 1.0, 1.0);
+      "image,beta_deg,gamma_deg\na,x,1\nb,1,y\n", "tilt.csv", kTiltOfPicture, 0.005, 1.0, 1.0);
   ASSERT_FALSE(faults);
   EXPECT_EQ(faults.error().size(), 2u);
 }
@@ -423,7 +367,7 @@ TEST_F(CalibrateTilt, EachFaultOfItsTableIsNamedWithLineAndColumn) {
 TEST_F(CalibrateTilt, ACutFlippedOrGluedTableIsRefusedOrReadAsItStands) {
   const std::string whole = Csv();
   const auto read = [](const std::string& text) {
-    const auto rows = ParseCalibrationTilts(text, "tilt.csv", 0.005, 1.0, 1.0);
+    const auto rows = ParseCalibrationTilts(text, "tilt.csv", kTiltOfPicture, 0.005, 1.0, 1.0);
     if (!rows) {
       EXPECT_FALSE(rows.error().empty());
       for (const FileFault& fault : rows.error()) EXPECT_THAT(fault.Text(), StartsWith("tilt.csv"));

@@ -1,18 +1,19 @@
 #include "guidance/app/check_command.h"
 
 #include <filesystem>
-#include <sstream>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
 
 namespace tbm {
 namespace {
 
+using test::Outcome;
 using test::ReadText;
 using test::TempFolder;
 using test::WriteText;
@@ -20,18 +21,7 @@ using ::testing::HasSubstr;
 
 const std::string kTable2 = TBM_SOURCE_DIR "/tests/data/paper_table2/";
 
-struct Outcome {
-  ExitCode code;
-  std::string out;
-  std::string err;
-};
-
-Outcome Check(const CheckRequest& request) {
-  std::ostringstream out;
-  std::ostringstream err;
-  const ExitCode code = RunCheck(request, {out, err});
-  return {code, out.str(), err.str()};
-}
+Outcome Check(const CheckRequest& request) { return test::Ran(RunCheck, request); }
 
 CheckRequest Table2(const std::string& method) {
   CheckRequest request;

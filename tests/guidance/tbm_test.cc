@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,6 +17,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "pose/rig/rig_file.h"
+#include "tests/support/calibration_data.h"
+#include "tests/support/command.h"
+#include "tests/support/scene.h"
 #include "tests/support/temp_folder.h"
 
 namespace tbm {
@@ -25,6 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::ReadText;
+using test::Rows;
 using test::TempFolder;
 using test::WriteText;
 using ::testing::HasSubstr;
@@ -59,17 +63,6 @@ class Tbm : public ::testing::Test {
   std::string out_;
   std::string err_;
 };
-
-std::vector<std::vector<std::string>> Rows(const std::string& csv) {
-  std::vector<std::vector<std::string>> rows;
-  std::istringstream lines(csv);
-  for (std::string line; std::getline(lines, line);) {
-    rows.emplace_back();
-    std::istringstream fields(line + ",");
-    for (std::string field; std::getline(fields, field, ',');) rows.back().push_back(field);
-  }
-  return rows;
-}
 
 TEST_F(Tbm, SolveWritesOneRowPerFrameWithExactlyThePromisedColumns) {
   ASSERT_EQ(Run("solve " + kRun + " --out " + Path("p.csv")), 0) << err_;
@@ -188,8 +181,16 @@ TEST_F(Tbm, ABadFileExitsWithTwoAndNamesItsLine) {
 }
 
 TEST_F(Tbm, HelpAndVersionExitWithZero) {
-  for (const std::string arguments :
-       {"--help", "solve --help", "centres --help", "check --help", "watch --help"}) {
+  for (const std::string arguments : {"--help",
+                                      "solve --help",
+                                      "centres --help",
+                                      "check --help",
+                                      "watch --help",
+                                      "calibrate --help",
+                                      "calibrate camera --help",
+                                      "calibrate tilt --help",
+                                      "calibrate target --help",
+                                      "calibrate rig --help"}) {
     EXPECT_EQ(Run(arguments), 0) << arguments;
     EXPECT_THAT(out_, HasSubstr("Example")) << arguments;
     EXPECT_EQ(err_, "");
@@ -310,6 +311,63 @@ TEST_F(Tbm, AxisCommandsTakeTheirOptions) {
   EXPECT_EQ(Run("axis"), 2);
 }
 
+// From what comes home from the workshop to a rig file, by the program alone.
+TEST_F(Tbm, CalibrateMakesARigFileOfPicturesTiltsAndPoints) {
+  const Rig truth = test::FieldRig();
+  for (const char* folder : {"pictures", "table", "placements"}) fs::create_directory(Path(folder));
+  test::MakeCameraPictures(Path("pictures"));
+  test::MakeTiltPictures(Path("table"), test::LevelTable(truth.camera_tilt.tilt_from_body));
+  test::MakeBoardSurvey(Path("placements"), {.rig = truth});
+  WriteText(Path("drawing.csv"),
+            "led,x_mm,y_mm,z_mm\nP1,-250,0,100\nP2,250,0,100\nP3,0,250,0\nP4,0,-250,0\n"
+            "P5,80,80,250\n");
+  WriteText(Path("points.yaml"),
+            "rig_name: workshop\npoints:\n  shield_head: {xyz_mm: [0, 0, -1600], sigma_mm: 0.2}\n");
+  const std::string board = " --board " + std::string(test::kWorkshopBoard);
+
+  ASSERT_EQ(Run("calibrate camera " + Path("pictures") + board + " --out " + Path("camera.yaml") +
+                " --picture " + Path("residuals.png") + " --coverage " + Path("coverage.png")),
+            0)
+      << err_;
+  EXPECT_THAT(out_, HasSubstr("18 pictures"));
+  EXPECT_THAT(ReadText(Path("residuals.png")), ::testing::StartsWith("\x89PNG"));
+  const std::string tilt = "calibrate tilt " + Path("table") + " --camera " + Path("camera.yaml") +
+                           " --out " + Path("tilt.yaml") + " --up 0 -1 0";
+  EXPECT_EQ(Run(tilt + " --board chessboard:9x7:25"), 2);
+  EXPECT_THAT(err_, HasSubstr("looks the same when turned"));
+  ASSERT_EQ(Run(tilt + board), 0) << err_;
+  EXPECT_THAT(out_, HasSubstr("12 placements"));
+  ASSERT_EQ(Run("calibrate target " + Path("placements") + " --nominal " + Path("drawing.csv") +
+                " --sigma-mm 0.1 --out " + Path("target.yaml")),
+            0)
+      << err_;
+  EXPECT_THAT(out_, HasSubstr("5 LEDs, 6 placements, 30 points"));
+  const std::string rig = "calibrate rig --camera " + Path("camera.yaml") + " --tilt " +
+                          Path("tilt.yaml") + " --target " + Path("target.yaml") + " --points " +
+                          Path("points.yaml") + " --distance-m 2 --out " + Path("rig.yaml");
+  ASSERT_EQ(Run(rig), 0) << err_;
+  EXPECT_EQ(err_, "");
+  EXPECT_THAT(out_, HasSubstr("shield_head, 3.69 m"));
+  EXPECT_THAT(out_, Not(HasSubstr("not known")));
+  EXPECT_EQ(Run(rig), 2) << "not over an existing file";
+
+  const auto loaded = LoadRigFile(Path("rig.yaml"));
+  ASSERT_TRUE(loaded.has_value()) << loaded.error()[0].Text();
+  EXPECT_TRUE(loaded->warnings.empty());
+  EXPECT_EQ(loaded->rig.name, "workshop");
+  for (const auto mount : {&Rig::camera_tilt, &Rig::target_tilt}) {
+    const TiltMount& found = loaded->rig.*mount;
+    const Eigen::Vector3d off =
+        found.tilt_from_body.transpose().col(2) - (truth.*mount).tilt_from_body.transpose().col(2);
+    EXPECT_LT(off.norm(), 0.0017) << "a tenth of a degree, the principal point's share included";
+    EXPECT_GT(found.mounting_sigma_rad, 1e-5);
+    EXPECT_LT(found.mounting_sigma_rad, 1e-3);
+  }
+  EXPECT_EQ(Run("calibrate"), 2);
+  EXPECT_EQ(Run("calibrate rig --camera x --out y"), 2);
+  EXPECT_EQ(Run("calibrate target x --nominal y --out z --sign 2 1"), 2);
+}
+
 TEST_F(Tbm, CompletionKnowsCommandsOptionsAndChoices) {
   ASSERT_EQ(Run("completion bash"), 0);
   const std::string script = Path("tbm.bash");
@@ -328,6 +386,8 @@ TEST_F(Tbm, CompletionKnowsCommandsOptionsAndChoices) {
   EXPECT_EQ(complete("tbm completion z", 2), "zsh\n");
   EXPECT_EQ(complete("tbm axis ev", 2), "eval\n");
   EXPECT_EQ(complete("tbm axis check --format j", 4), "json\n");
+  EXPECT_EQ(complete("tbm calibrate ta", 2), "target\n");
+  EXPECT_EQ(complete("tbm calibrate rig --dis", 3), "--distance-m\n");
   ASSERT_EQ(Run("completion zsh"), 0);
   EXPECT_THAT(out_, HasSubstr("'--method[estimator]:value:(fused published vision)'"));
 }

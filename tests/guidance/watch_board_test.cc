@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "pose/base/angle.h"
+#include "tests/idl/rail_samples.h"
 
 namespace tbm {
 namespace {
@@ -475,6 +476,60 @@ TEST(WatchLine, GuidanceGivesItsNumbersAndLeavesOutWhatIsMissing) {
   shield.reason = "no_prisms";
   EXPECT_THAT(WatchLine(shield, 0.1), HasSubstr("status=none shield=rear reason=no_prisms"));
   EXPECT_THAT(WatchLine(shield, 0.1), Not(HasSubstr("east_m")));
+}
+
+TEST(WatchBoard, ALineIsToldWholeOnlyWhenAllItsPiecesAreThere) {
+  WatchBoard board;
+  dds::RailLinePiece piece = dds::test::FullRailLinePiece();
+  piece.pieces = 2;
+  piece.piece = 1;
+  board.Add(piece, kSteady);
+  const WatchNow now = NowAfter(std::chrono::milliseconds(100));
+  EXPECT_EQ(RowOf(board, now, "line machine-20").status, "1 of 2 pieces");
+  EXPECT_EQ(RowOf(board, now, "line machine-20").sigma, "");
+  piece.piece = 2;
+  board.Add(piece, kSteady);
+  EXPECT_EQ(RowOf(board, now, "line machine-20").status, "whole");
+  EXPECT_THAT(RowOf(board, now, "line machine-20").value, HasSubstr("91.50 m"));
+  piece.run_id = "the next";
+  board.Add(piece, kSteady);  // nothing of the run before is left
+  EXPECT_EQ(RowOf(board, now, "line machine-20").status, "1 of 2 pieces");
+}
+
+TEST(WatchBoard, TheTrolleyWithoutAPlaceGivesItsReasonAndSettlementItsAlert) {
+  WatchBoard board;
+  dds::TrolleyState state = dds::test::FullTrolleyState();
+  state.published_at = kUtc;
+  board.Add(state, kSteady);
+  const WatchNow now = NowAfter(std::chrono::milliseconds(100));
+  EXPECT_THAT(RowOf(board, now, "trolley machine-19").value, HasSubstr("804.1000 -805.2000"));
+  EXPECT_EQ(RowOf(board, now, "trolley machine-19").status, "open");
+  state.status = dds::RailPointStatus::kNone;
+  state.reason = "imu_silent";
+  board.Add(state, kSteady);
+  EXPECT_EQ(RowOf(board, now, "trolley machine-19").status, "none imu_silent");
+  EXPECT_EQ(RowOf(board, now, "trolley machine-19").value, "");
+  EXPECT_THAT(WatchLine(state, 0.1), Not(HasSubstr("x_m=")));
+  dds::SettlementPiece piece = dds::test::FullSettlementPiece();
+  piece.pieces = 1;
+  piece.piece = 1;
+  board.Add(piece, kSteady);
+  const WatchRow row = RowOf(board, now, "settlement machine-21");
+  EXPECT_EQ(row.status, "ALERT 4, whole");
+  EXPECT_EQ(row.style, WatchStyle::kBad);
+  EXPECT_THAT(row.value, HasSubstr("-10.70 mm at 10.60 m"));
+}
+
+TEST(WatchBoard, ACalibrationThatIsDueIsNotShownAsGood) {
+  WatchBoard board;
+  dds::CalibrationStatus status = dds::test::FullCalibrationStatus();
+  status.published_at = kUtc;
+  board.Add(status, kSteady);
+  const WatchRow row =
+      RowOf(board, NowAfter(std::chrono::milliseconds(100)), "calibration machine-23 imu_mounting");
+  EXPECT_EQ(row.status, "due overdue");
+  EXPECT_EQ(row.style, WatchStyle::kDegraded);
+  EXPECT_THAT(row.value, HasSubstr("116 days old of 90, used by rail_line"));
 }
 
 }  // namespace

@@ -139,6 +139,36 @@ TEST(TiltRotation, WithGravityKnownNoYawIsNeeded) {
   }
 }
 
+// Little turning costs accuracy; the sigma knows it, and decides.
+TEST(TiltRotation, LittleYawIsTakenWithItsSigma) {
+  double over_sigma = 0.0;
+  double squared_deg = 0.0;
+  int taken = 0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    Bench bench(seed);
+    bench.yaw_deg = 10.0;
+    bench.Draw();
+    const auto found = FindTiltRotation(bench.placements, {});
+    if (!found) {
+      EXPECT_EQ(found.error().fault, TiltRotationFault::kNoYaw) << "seed " << seed;
+      continue;
+    }
+    ++taken;
+    const Eigen::AngleAxisd off(
+        Eigen::Matrix3d(bench.camera_from_housing * found->camera_from_housing.transpose()));
+    const Eigen::Vector3d e = off.angle() * off.axis();
+    over_sigma += e.dot(found->covariance.inverse() * e) / 3.0;
+    squared_deg += std::pow(bench.Error_deg(found->camera_from_housing), 2);
+  }
+  std::printf("%d of 60 taken, %.3f degrees rms, NEES over its size %.2f\n",
+              taken,
+              std::sqrt(squared_deg / taken),
+              over_sigma / taken);
+  EXPECT_GE(taken, 50);
+  EXPECT_LT(std::sqrt(squared_deg / taken), 0.12);
+  EXPECT_NEAR(over_sigma / taken, 1.0, 0.3);
+}
+
 TEST(TiltRotation, OneTiltAxisIsEnoughWhereGravityIsKnown) {
   Bench bench(3);
   bench.other_tilt_deg = 0.0;

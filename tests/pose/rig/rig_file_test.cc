@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "pose/base/angle.h"
+#include "pose/rig/rig_text.h"
 
 namespace tbm {
 namespace {
@@ -225,6 +226,51 @@ TEST(RigFile, SaysWhichFileIsMissing) {
   const auto loaded = LoadRigFile("/nowhere/rig.yaml");
   ASSERT_FALSE(loaded.has_value());
   EXPECT_THAT(loaded.error()[0].Text(), HasSubstr("/nowhere/rig.yaml"));
+}
+
+TEST(RigText, WhatIsWrittenIsReadBack) {
+  const auto loaded = ParseRig(GoodText(), "rig.yaml");
+  ASSERT_TRUE(loaded.has_value());
+  Rig rig = loaded->rig;
+  rig.name = "north \"tube\": #1\n\\";
+  rig.camera.k3 = -1.234567890123456e-7;
+  rig.intrinsics_sigma_px[2] = 1.0 / 3.0;
+  rig.leds[0].p_led_in_target.x() += 1.23e-6;
+  rig.camera_tilt.mounting_sigma_rad = DegToRad(0.012);
+  rig.points.push_back({"null", {0.001, 0.002, 0.003}, 0.0});
+  const std::string text = RigYaml(rig);
+  const auto again = ParseRig(text, "again.yaml");
+  ASSERT_TRUE(again.has_value()) << again.error()[0].Text() << "\n" << text;
+  EXPECT_TRUE(again->warnings.empty());
+  const Rig& got = again->rig;
+  EXPECT_EQ(got.name, rig.name);
+  EXPECT_EQ(got.camera.image_height_px, 1024);
+  EXPECT_EQ(got.camera.fx_px, rig.camera.fx_px);
+  EXPECT_EQ(got.camera.cy_px, rig.camera.cy_px);
+  EXPECT_EQ(got.camera.p2, rig.camera.p2);
+  EXPECT_EQ(got.camera.k3, rig.camera.k3);
+  EXPECT_EQ(got.calibration_residual_px, rig.calibration_residual_px);
+  EXPECT_LT((got.intrinsics_sigma_px - rig.intrinsics_sigma_px).norm(), 1e-9);
+  EXPECT_EQ(got.gain_dn_per_electron, rig.gain_dn_per_electron);
+  EXPECT_EQ(got.read_noise_dn, rig.read_noise_dn);
+  ASSERT_EQ(got.leds.size(), rig.leds.size());
+  for (std::size_t i = 0; i < rig.leds.size(); ++i) {
+    EXPECT_EQ(got.leds[i].id, rig.leds[i].id);
+    EXPECT_LT((got.leds[i].p_led_in_target - rig.leds[i].p_led_in_target).norm(), 1e-7);
+    EXPECT_NEAR(got.leds[i].sigma_m, rig.leds[i].sigma_m, 1e-7);
+  }
+  for (const auto mount : {&Rig::target_tilt, &Rig::camera_tilt}) {
+    EXPECT_LT(((got.*mount).tilt_from_body - (rig.*mount).tilt_from_body).cwiseAbs().maxCoeff(),
+              1e-9);
+    EXPECT_EQ((got.*mount).sign, (rig.*mount).sign);
+    EXPECT_NEAR((got.*mount).sigma_rad, (rig.*mount).sigma_rad, 1e-12);
+    EXPECT_NEAR((got.*mount).mounting_sigma_rad, (rig.*mount).mounting_sigma_rad, 1e-12);
+  }
+  ASSERT_EQ(got.points.size(), 2u);
+  EXPECT_EQ(got.points[1].name, "null");
+  EXPECT_NEAR(got.points[0].sigma_m, 0.2e-3, 1e-12);
+  // Written again it is the same text.
+  EXPECT_EQ(RigYaml(got), text);
 }
 
 // What a broken transfer leaves must never bring the reader down; that most of it is refused is

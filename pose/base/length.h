@@ -1,0 +1,7 @@
+#pragma once
+
+namespace tbm {
+
+inline constexpr double kMmPerMetre = 1000.0;
+
+}  // namespace tbm
