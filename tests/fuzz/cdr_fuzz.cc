@@ -18,6 +18,7 @@
 #include "idl/cpp/wire_type.h"
 #include "pose/rig/rig.h"
 #include "tests/idl/guidance_samples.h"
+#include "tests/idl/rail_samples.h"
 #include "tests/idl/samples.h"
 
 extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size);
@@ -119,6 +120,27 @@ void ExpectSound(const AlarmStatus& m) {
 }
 void ExpectSound(const Command& m) { Expect(!m.verb.empty() && m.expires_at >= m.issued_at); }
 void ExpectSound(const CommandReply& m) { Expect(!m.request_id.empty() && m.published_at.ns > 0); }
+void ExpectSound(const TrolleyState& m) {
+  const bool is_there = m.status != RailPointStatus::kNone;
+  Expect(is_there == m.reason.empty() && m.position_world_m.allFinite() == is_there);
+  if (is_there) Expect(std::abs(m.world_from_imu.norm() - 1.0) < 1e-5 && m.distance_m >= 0.0);
+}
+void ExpectSound(const RailLinePiece& m) {
+  Expect(m.piece >= 1 && m.piece <= m.pieces && m.points.size() > 0);
+  for (const RailLinePoint& point : m.points) {
+    Expect(point.status != RailPointStatus::kNone && point.sigma_world_m.minCoeff() >= 0.0);
+  }
+}
+void ExpectSound(const SettlementPiece& m) {
+  Expect(m.piece >= 1 && m.piece <= m.pieces && m.points.size() > 0);
+  for (const SettlementPoint& point : m.points) {
+    Expect(point.alert <= m.highest_alert && (!point.is_significant || IsFinite(point.dz_m)));
+  }
+}
+void ExpectSound(const CalibrationStatus& m) {
+  Expect((m.state == CalibrationState::kValid) == m.reason.empty());
+  Expect(IsFinite(m.age_days) == (m.calibrated_at != kNever));
+}
 
 template <class Message>
 void Receive(const char* payload, std::size_t size) {
@@ -177,7 +199,11 @@ const auto kReceivers = std::make_tuple(&Receive<FrameFeatures>,
                                         &Receive<Guidance>,
                                         &Receive<AlarmStatus>,
                                         &Receive<Command>,
-                                        &Receive<CommandReply>);
+                                        &Receive<CommandReply>,
+                                        &Receive<TrolleyState>,
+                                        &Receive<RailLinePiece>,
+                                        &Receive<SettlementPiece>,
+                                        &Receive<CalibrationStatus>);
 constexpr unsigned kTopicCount = std::tuple_size_v<decltype(kReceivers)>;
 
 // A whole sample from which the search goes on.
@@ -186,7 +212,7 @@ std::size_t Seed(unsigned which, std::uint8_t* data, std::size_t max_size) {
     data[0] = topic;
     return 1 + Send(message, data + 1, max_size - 1);
   };
-  switch (which % 14) {
+  switch (which % 18) {
     case 0:
       return sample(0, test::FullFrameFeatures());
     case 1:
@@ -213,6 +239,14 @@ std::size_t Seed(unsigned which, std::uint8_t* data, std::size_t max_size) {
       return sample(10, test::FullCommand());
     case 12:
       return sample(11, test::FullCommandReply());
+    case 13:
+      return sample(12, test::FullTrolleyState());
+    case 14:
+      return sample(13, test::FullRailLinePiece());
+    case 15:
+      return sample(14, test::FullSettlementPiece());
+    case 16:
+      return sample(15, test::FullCalibrationStatus());
     default:
       return sample(2, NoPose());
   }

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "guidance/app/output_file.h"
+
+namespace tbm {
+
+// A command's table, and beside it under the same name as .json what it rests on. The table may go
+// to the standard output ("-"); then there is no report.
+class TableAndReport {
+ public:
+  TableAndReport(const std::string& out, bool may_replace)
+      : table_(out, may_replace),
+        report_(NameOfReport(out), may_replace),
+        has_report_(out != "-") {}
+
+  bool has_report() const { return has_report_; }
+
+  std::optional<std::string> Obstacle() const {
+    if (auto obstacle = table_.Obstacle()) return obstacle;
+    return has_report_ ? report_.Obstacle() : std::nullopt;
+  }
+  std::optional<std::string> Write(std::string_view table, std::string_view report) const {
+    if (auto fault = table_.Write(table)) return fault;
+    return has_report_ ? report_.Write(report) : std::nullopt;
+  }
+
+ private:
+  static std::string NameOfReport(const std::string& out) {
+    const std::size_t dot = out.rfind('.');
+    const std::size_t slash = out.rfind('/');
+    const bool has_suffix = dot != std::string::npos && (slash == std::string::npos || dot > slash);
+    return (has_suffix ? out.substr(0, dot) : out) + ".json";
+  }
+
+  OutputFile table_;
+  OutputFile report_;
+  bool has_report_;
+};
+
+}  // namespace tbm
