@@ -19,12 +19,25 @@ constexpr double kLeastLikelyPoint = 1e-6;
 // Of a point against what all of its image say.
 constexpr double kLeastLikelyRest = 1e-5;
 constexpr int kRounds = 12;
+constexpr int kMostSteps = 8;
+// Of a point's sigma: what an image point is off the straight line along which the state is moved.
+constexpr double kStraight = 0.1;
 
 struct Candidate {
   int target = 0;
   Eigen::Vector2d pixel_px;
-  PixelPrediction prediction;
+  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, FusionLayout::kMost> by_error;
+  // From where the state puts it; by the derivative where that is taken elsewhere.
+  Eigen::Vector2d off_px;
   double sigma_px = 0.0;
+};
+
+// All on which a prediction rests.
+struct Exposure {
+  const FusionLayout& layout;
+  const CameraModel& camera;
+  Eigen::Vector3d rate_rad_s;
+  bool is_moving = false;
 };
 
 // Rows of all candidates divided by their sigma: many rows, of which the QR leaves as many as there
@@ -40,8 +53,8 @@ Stacked Stack(const std::vector<Candidate>& candidates, int size) {
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Candidate& one = candidates[i];
     const auto row = static_cast<Eigen::Index>(2 * i);
-    stacked.h.middleRows<2>(row) = one.prediction.by_error / one.sigma_px;
-    stacked.residual.segment<2>(row) = (one.pixel_px - one.prediction.pixel_px) / one.sigma_px;
+    stacked.h.middleRows<2>(row) = one.by_error / one.sigma_px;
+    stacked.residual.segment<2>(row) = one.off_px / one.sigma_px;
   }
   return stacked;
 }
@@ -70,7 +83,7 @@ Compressed Compress(const Stacked& stacked) {
 
 // What a pixel is off when the state is moved by what the others say.
 double Unlikely(const Candidate& one, const FusionVector& e) {
-  const Eigen::Vector2d off = one.pixel_px - one.prediction.pixel_px - one.prediction.by_error * e;
+  const Eigen::Vector2d off = one.off_px - one.by_error * e;
   return off.squaredNorm() / (one.sigma_px * one.sigma_px);
 }
 
@@ -87,14 +100,15 @@ double PixelSigma(const PixelPrediction& prediction, double residual_px, double 
   return std::hypot(residual_px, by_target);
 }
 
-}  // namespace
+Exposure ExposureOf(const FusionFilter& filter, const CameraModel& camera) {
+  return {filter.layout(), camera, filter.rate_rad_s(), IsMoving(filter)};
+}
 
-Result<PixelPrediction, CameraModelFailure> PredictPixel(const FusionFilter& filter,
-                                                         const CameraModel& camera,
-                                                         const SurveyedTarget& target) {
-  const FusionState& state = filter.state();
-  const FusionLayout& layout = filter.layout();
-  const Eigen::Vector3d rate = filter.rate_rad_s();
+Result<PixelPrediction, CameraModelFailure> Predict(const Exposure& exposure,
+                                                    const FusionState& state,
+                                                    const SurveyedTarget& target) {
+  const FusionLayout& layout = exposure.layout;
+  const Eigen::Vector3d& rate = exposure.rate_rad_s;
   const double late_s = state.time_offset_s;
   const Eigen::Vector3d imu_in_world =
       state.motion.position_world_m - late_s * state.motion.velocity_world_m_s;
@@ -107,7 +121,7 @@ Result<PixelPrediction, CameraModelFailure> PredictPixel(const FusionFilter& fil
   const Eigen::Vector3d in_imu = imu_from_world * (in_world - imu_in_world);
   const Eigen::Matrix3d camera_from_imu = state.camera_from_imu.toRotationMatrix();
   const Eigen::Vector3d in_camera = camera_from_imu * (in_imu - state.camera_in_imu_m);
-  const auto projection = Project(camera, in_camera);
+  const auto projection = Project(exposure.camera, in_camera);
   if (!projection) return Failure{projection.error()};
 
   PixelPrediction prediction;
@@ -122,7 +136,7 @@ Result<PixelPrediction, CameraModelFailure> PredictPixel(const FusionFilter& fil
   // An error of the attitude, seen from the axes at the exposure.
   h.middleCols<3>(FusionLayout::kAttitude) =
       by_imu * Skew(in_imu) * ExpRotation(late_s * rate).toRotationMatrix();
-  if (layout.Has(FusionOption::kTimeOffset) && IsMoving(filter)) {
+  if (layout.Has(FusionOption::kTimeOffset) && exposure.is_moving) {
     h.col(layout.At(FusionOption::kTimeOffset)) =
         prediction.by_target_px_per_m * state.motion.velocity_world_m_s -
         by_imu * (Skew(in_imu) * rate);
@@ -139,6 +153,51 @@ Result<PixelPrediction, CameraModelFailure> PredictPixel(const FusionFilter& fil
   return prediction;
 }
 
+// What all candidates together say of the error of the filter's state.
+FusionVector Told(const FusionFilter& filter, const std::vector<Candidate>& candidates) {
+  const Compressed all = Compress(Stack(candidates, filter.layout().size()));
+  const FusionMatrix& h = all.measurement.h;
+  const FusionMatrix cross = filter.covariance() * h.transpose();
+  const FusionMatrix spread = h * cross + all.measurement.noise;
+  return cross * spread.llt().solve(all.measurement.residual);
+}
+
+// Takes the derivatives where the image puts the state, not where the filter had it: after a long
+// way without targets the two are far from each other, and what is linear there is not so here.
+// Returns what the candidates then say.
+FusionVector LineariseWhereTold(const FusionFilter& filter,
+                                const Exposure& exposure,
+                                std::span<const SurveyedTarget> targets,
+                                std::vector<Candidate>* candidates) {
+  FusionVector e = Told(filter, *candidates);
+  for (int step = 0; step < kMostSteps; ++step) {
+    const FusionState there = MovedBy(filter.state(), filter.layout(), e);
+    std::vector<Candidate> moved = *candidates;
+    double bent = 0.0;
+    for (Candidate& one : moved) {
+      const auto prediction =
+          Predict(exposure, there, targets[static_cast<std::size_t>(one.target)]);
+      if (!prediction) return e;
+      const Eigen::Vector2d off_px = one.pixel_px - prediction->pixel_px;
+      bent = std::max(bent, (off_px - (one.off_px - one.by_error * e)).norm() / one.sigma_px);
+      one.by_error = prediction->by_error;
+      one.off_px = off_px + one.by_error * e;
+    }
+    if (bent < kStraight) break;
+    *candidates = std::move(moved);
+    e = Told(filter, *candidates);
+  }
+  return e;
+}
+
+}  // namespace
+
+Result<PixelPrediction, CameraModelFailure> PredictPixel(const FusionFilter& filter,
+                                                         const CameraModel& camera,
+                                                         const SurveyedTarget& target) {
+  return Predict(ExposureOf(filter, camera), filter.state(), target);
+}
+
 TargetsVerdict UpdateByTargets(FusionFilter& filter,
                                const CameraModel& camera,
                                double residual_px,
@@ -148,17 +207,19 @@ TargetsVerdict UpdateByTargets(FusionFilter& filter,
   outcome.verdict.update = FusionUpdate::kTargets;
   outcome.verdict.sensed_at = filter.now();
   const int size = filter.layout().size();
+  const Exposure exposure = ExposureOf(filter, camera);
 
   std::vector<Candidate> candidates;
   for (const TargetPixel& pixel : pixels) {
     const SurveyedTarget& target = targets[static_cast<std::size_t>(pixel.target)];
-    const auto prediction = PredictPixel(filter, camera, target);
+    const auto prediction = Predict(exposure, filter.state(), target);
     if (!prediction) {
       outcome.rejected.push_back(
           {pixel.target, "behind_camera", std::numeric_limits<double>::quiet_NaN()});
       continue;
     }
-    const double sigma_px = PixelSigma(*prediction, residual_px, target.sigma_m);
+    const double sigma_px =
+        PixelSigma(*prediction, std::max(residual_px, pixel.sigma_px), target.sigma_m);
     const Eigen::Vector2d off_px = pixel.pixel_px - prediction->pixel_px;
     const Row cross = prediction->by_error * filter.covariance();
     Eigen::Matrix2d spread = cross * prediction->by_error.transpose();
@@ -168,16 +229,12 @@ TargetsVerdict UpdateByTargets(FusionFilter& filter,
       outcome.rejected.push_back({pixel.target, "far_from_prediction", off_px.norm()});
       continue;
     }
-    candidates.push_back({pixel.target, pixel.pixel_px, *prediction, sigma_px});
+    candidates.push_back({pixel.target, pixel.pixel_px, prediction->by_error, off_px, sigma_px});
   }
 
   // The worst that does not fit what the rest say goes, until all that is left fits.
   for (int round = 0; round < kRounds && candidates.size() > 2; ++round) {
-    const Compressed all = Compress(Stack(candidates, size));
-    const FusionMatrix& h = all.measurement.h;
-    const FusionMatrix cross = filter.covariance() * h.transpose();
-    const FusionMatrix spread = h * cross + all.measurement.noise;
-    const FusionVector e = cross * spread.llt().solve(all.measurement.residual);
+    const FusionVector e = LineariseWhereTold(filter, exposure, targets, &candidates);
     double worst = 0.0;
     std::vector<double> off(candidates.size());
     for (std::size_t i = 0; i < candidates.size(); ++i) {

@@ -25,6 +25,8 @@ struct SurveyedTarget {
 struct TargetPixel {
   int target = 0;  // index into the targets
   Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
+  // Of one coordinate, where it is known of this point; counts where it is worse than that of all.
+  double sigma_px = 0.0;
 };
 
 // One of them that was not taken.
