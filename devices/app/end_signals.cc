@@ -5,6 +5,8 @@
 #include <csignal>
 #include <ctime>
 
+#include <unistd.h>
+
 namespace tbm {
 namespace {
 
@@ -36,5 +38,7 @@ void WaitForEnd(double run_for_s) {
   while (sigtimedwait(&set, nullptr, &limit) < 0 && errno == EINTR) {
   }
 }
+
+void EndTheWait() { kill(getpid(), SIGTERM); }
 
 }  // namespace tbm

@@ -16,6 +16,7 @@ void RunService(const Clock& clock, const ServiceLoop& loop) {
   ServiceManager manager(clock);
   loop(stop.get_token(), [&manager] { manager.TellAlive(); });
   manager.TellStopping();
+  if (!stop.stop_requested()) EndTheWait();
 }
 
 }  // namespace tbm

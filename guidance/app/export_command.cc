@@ -59,8 +59,12 @@ const std::vector<Topic>& KnownTopics() {
                                                     dds::Guidance,
                                                     dds::AlarmStatus,
                                                     dds::Command,
-                                                    dds::CommandReply>();
-  static_assert(dds::kTopics.size() == 12, "a new topic needs its columns");
+                                                    dds::CommandReply,
+                                                    dds::TrolleyState,
+                                                    dds::RailLinePiece,
+                                                    dds::SettlementPiece,
+                                                    dds::CalibrationStatus>();
+  static_assert(dds::kTopics.size() == 16, "a new topic needs its columns");
   return topics;
 }
 

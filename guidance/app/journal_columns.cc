@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "idl/cpp/words.h"
+
 namespace tbm {
 namespace {
 
@@ -108,6 +110,21 @@ void AddPredicted(JournalRow row, const dds::PredictedDeviation& predicted) {
   row.Number("deviation_up_m", predicted.deviation_up_m);
   row.Number("deviation_right_sigma_m", predicted.deviation_right_sigma_m);
   row.Number("deviation_up_sigma_m", predicted.deviation_up_sigma_m);
+}
+
+void AddRailPoint(JournalRow row, const dds::RailLinePoint& point) {
+  row.Number("distance_m", point.distance_m);
+  AddVector(row, {"x_world_m", "y_world_m", "z_world_m"}, point.position_world_m);
+  AddVector(row, {"sigma_x_m", "sigma_y_m", "sigma_z_m"}, point.sigma_world_m);
+  row.Text("status", dds::WordOf(point.status));
+}
+
+void AddSettlementPoint(JournalRow row, const dds::SettlementPoint& point) {
+  row.Number("distance_m", point.distance_m);
+  row.Number("dz_m", point.dz_m);
+  row.Number("sigma_m", point.sigma_m);
+  row.Flag("is_significant", point.is_significant);
+  row.Whole("alert", point.alert);
 }
 
 // "cutter_face_": the name out of a message, before those of its fields.
@@ -391,6 +408,104 @@ void AddCells(JournalRow& row, const dds::CommandReply& m) {
   row.Text("outcome", Word(m.outcome, kOutcomes));
   row.Text("text", m.text);
   row.Time("published_at_utc_ns", m.published_at);
+}
+
+void AddCells(JournalRow& row, const dds::TrolleyState& m) {
+  row.Text("machine_id", m.machine_id);
+  row.Time("valid_at_utc_ns", m.valid_at);
+  row.Time("published_at_utc_ns", m.published_at);
+  row.Count("sample_number", m.sample_number);
+  row.Text("run_id", m.run_id);
+  row.Text("status", dds::WordOf(m.status));
+  row.Text("reason", m.reason);
+  AddVector(row, {"x_world_m", "y_world_m", "z_world_m"}, m.position_world_m);
+  AddVector(row, {"sigma_x_m", "sigma_y_m", "sigma_z_m"}, m.sigma_position_m);
+  AddVector(row,
+            {"velocity_x_m_per_s", "velocity_y_m_per_s", "velocity_z_m_per_s"},
+            m.velocity_world_m_per_s);
+  AddVector(row,
+            {"sigma_velocity_x_m_per_s", "sigma_velocity_y_m_per_s", "sigma_velocity_z_m_per_s"},
+            m.sigma_velocity_m_per_s);
+  row.Number("world_from_imu_qw", m.world_from_imu.w());
+  row.Number("world_from_imu_qx", m.world_from_imu.x());
+  row.Number("world_from_imu_qy", m.world_from_imu.y());
+  row.Number("world_from_imu_qz", m.world_from_imu.z());
+  AddVector(row,
+            {"sigma_attitude_x_rad", "sigma_attitude_y_rad", "sigma_attitude_z_rad"},
+            m.sigma_attitude_rad);
+  AddVector(row,
+            {"gyro_bias_x_rad_per_s", "gyro_bias_y_rad_per_s", "gyro_bias_z_rad_per_s"},
+            m.gyro_bias_rad_per_s);
+  AddVector(
+      row,
+      {"sigma_gyro_bias_x_rad_per_s", "sigma_gyro_bias_y_rad_per_s", "sigma_gyro_bias_z_rad_per_s"},
+      m.sigma_gyro_bias_rad_per_s);
+  AddVector(row,
+            {"accel_bias_x_m_per_s2", "accel_bias_y_m_per_s2", "accel_bias_z_m_per_s2"},
+            m.accel_bias_m_per_s2);
+  AddVector(
+      row,
+      {"sigma_accel_bias_x_m_per_s2", "sigma_accel_bias_y_m_per_s2", "sigma_accel_bias_z_m_per_s2"},
+      m.sigma_accel_bias_m_per_s2);
+  row.Number("distance_m", m.distance_m);
+  row.Number("target_age_s", m.target_age_s);
+  row.Number("tilt_age_s", m.tilt_age_s);
+  row.Number("rest_age_s", m.rest_age_s);
+  row.Count("came_too_late", m.came_too_late);
+  row.Count("gaps", m.gaps);
+}
+
+void AddCells(JournalRow& row, const dds::RailLinePiece& m) {
+  row.Text("machine_id", m.machine_id);
+  row.Whole("piece", m.piece);
+  row.Time("published_at_utc_ns", m.published_at);
+  row.Text("run_id", m.run_id);
+  row.Text("line_sha256", m.line_sha256);
+  row.Text("method", m.method);
+  row.Time("begins_at_utc_ns", m.begins_at);
+  row.Time("ends_at_utc_ns", m.ends_at);
+  row.Whole("pieces", m.pieces);
+  row.Whole("points_in_all", m.points_in_all);
+  row.Whole("points_before", m.points_before);
+  for (std::size_t i = 0; i < m.points.size(); ++i) {
+    AddRailPoint(row.Part(fmt::format("point_{}_", i + 1)), m.points[i]);
+  }
+}
+
+void AddCells(JournalRow& row, const dds::SettlementPiece& m) {
+  row.Text("machine_id", m.machine_id);
+  row.Whole("piece", m.piece);
+  row.Time("published_at_utc_ns", m.published_at);
+  row.Text("base_run_id", m.base_run_id);
+  row.Text("later_run_id", m.later_run_id);
+  row.Text("base_sha256", m.base_sha256);
+  row.Text("later_sha256", m.later_sha256);
+  row.Number("level", m.level);
+  row.Whole("highest_alert", m.highest_alert);
+  row.Whole("pieces", m.pieces);
+  row.Whole("points_in_all", m.points_in_all);
+  row.Whole("points_before", m.points_before);
+  for (std::size_t i = 0; i < m.points.size(); ++i) {
+    AddSettlementPoint(row.Part(fmt::format("point_{}_", i + 1)), m.points[i]);
+  }
+}
+
+void AddCells(JournalRow& row, const dds::CalibrationStatus& m) {
+  row.Text("machine_id", m.machine_id);
+  row.Text("subject", m.subject);
+  row.Text("source", m.source);
+  row.Time("published_at_utc_ns", m.published_at);
+  row.Text("state", dds::WordOf(m.state));
+  row.Text("reason", m.reason);
+  row.Time("calibrated_at_utc_ns", m.calibrated_at);
+  row.Number("age_days", m.age_days);
+  row.Number("due_after_days", m.due_after_days);
+  row.Text("file_sha256", m.file_sha256);
+  for (const dds::CalibrationSigma& sigma : m.sigmas) {
+    JournalRow part = row.Part(Before(sigma.what));
+    part.Number("sigma", sigma.sigma);
+    part.Text("unit", sigma.unit);
+  }
 }
 
 }  // namespace tbm

@@ -3,6 +3,7 @@
 #include "guidance/app/journal_table.h"
 #include "idl/cpp/guidance_messages.h"
 #include "idl/cpp/messages.h"
+#include "idl/cpp/rail_messages.h"
 
 namespace tbm {
 
@@ -21,5 +22,9 @@ void AddCells(JournalRow& row, const dds::Guidance& message);
 void AddCells(JournalRow& row, const dds::AlarmStatus& message);
 void AddCells(JournalRow& row, const dds::Command& message);
 void AddCells(JournalRow& row, const dds::CommandReply& message);
+void AddCells(JournalRow& row, const dds::TrolleyState& message);
+void AddCells(JournalRow& row, const dds::RailLinePiece& message);
+void AddCells(JournalRow& row, const dds::SettlementPiece& message);
+void AddCells(JournalRow& row, const dds::CalibrationStatus& message);
 
 }  // namespace tbm

@@ -9,8 +9,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "guidance/app/output_file.h"
 #include "guidance/app/rail_run.h"
+#include "guidance/app/rail_start_words.h"
+#include "guidance/app/table_and_report.h"
 #include "guidance/rail/inertial_line.h"
 #include "guidance/rail/rail_line.h"
 
@@ -162,53 +163,6 @@ std::string Summary(const RailLine& line, const RailRun& run) {
   return text;
 }
 
-constexpr std::array<std::string_view, 6> kImuAxes = {
-    "gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s", "accel_x_m_s2", "accel_y_m_s2", "accel_z_m_s2"};
-
-std::string Explain(const RailStartFailure& failure, const RailRun& run) {
-  switch (failure.fault) {
-    case RailStartFault::kNoImu:
-      return "imu.csv: there is less than a second of samples";
-    case RailStartFault::kNoRest:
-      return "rail.yaml: start.at_rest_s: the trolley must rest for at least 2 s at first";
-    case RailStartFault::kMovesAtStart:
-      return fmt::format(
-          "imu.csv: the trolley moves {:.1f} s after its first sample, and rail.yaml says "
-          "start.at_rest_s: {}; give the time it really rested",
-          failure.at_s,
-          run.setup.start.at_rest_s);
-    case RailStartFault::kWrongRateUnit:
-      return fmt::format(
-          "imu.csv: the gyros' noise at rest is {:.0f} times what imu.angle_random_walk_deg_sqrt_h "
-          "says: are these degrees per second where radians per second belong?",
-          failure.times);
-    case RailStartFault::kWrongForce:
-      return fmt::format(
-          "imu.csv: at rest the accelerometers show {:.3f} times gravity: m/s2 belong there, not g "
-          "or mg",
-          failure.times);
-    case RailStartFault::kBiasTooLarge:
-      return fmt::format(
-          "imu.csv: {} shows at rest {:.0f} times what imu.gyro_bias_deg_h and the turning of the "
-          "Earth allow",
-          kImuAxes[static_cast<std::size_t>(failure.axis)],
-          failure.times);
-    case RailStartFault::kFrozen:
-      return fmt::format("imu.csv: {} shows one and the same number",
-                         kImuAxes[static_cast<std::size_t>(failure.axis)]);
-    case RailStartFault::kNoHeading:
-      return "rail.yaml: the heading is not known and no target is seen: give start.heading_deg, "
-             "sigma_heading_deg and heading_known: true";
-    case RailStartFault::kNoTargetFits:
-      return fmt::format(
-          "centres.csv: whatever the heading, the targets lie {:.0f} px from where "
-          "start.position_m and targets.csv put them: names exchanged, another place, or another "
-          "camera",
-          failure.off_px);
-  }
-  return "";
-}
-
 Result<RailLine, RailStartFailure> Solve(const LineRequest& request, const RailRun& run) {
   if (request.method == "inertial") return SolveInertialLine(run.setup, run.recording);
   return SolveRailLine(run.setup,
@@ -216,24 +170,13 @@ Result<RailLine, RailStartFailure> Solve(const LineRequest& request, const RailR
                        request.method == "filter" ? RailMethod::kFilter : RailMethod::kSmoothed);
 }
 
-std::string ReportName(const std::string& out) {
-  const std::size_t dot = out.rfind('.');
-  const std::size_t slash = out.rfind('/');
-  const bool has_suffix = dot != std::string::npos && (slash == std::string::npos || dot > slash);
-  return (has_suffix ? out.substr(0, dot) : out) + ".json";
-}
-
 }  // namespace
 
 ExitCode RunLine(const LineRequest& request, const Console& console) {
-  const bool has_report = request.out != "-";
-  const OutputFile table(request.out, request.force);
-  const OutputFile report(has_report ? ReportName(request.out) : "", request.force);
-  for (const OutputFile* file : {&table, has_report ? &report : &table}) {
-    if (const auto obstacle = file->Obstacle()) {
-      Complain(console, *obstacle);
-      return ExitCode::kBadInput;
-    }
+  const TableAndReport files(request.out, request.force);
+  if (const auto obstacle = files.Obstacle()) {
+    Complain(console, *obstacle);
+    return ExitCode::kBadInput;
   }
   const auto run = ReadRailRun(request.run);
   if (!run) {
@@ -241,18 +184,17 @@ ExitCode RunLine(const LineRequest& request, const Console& console) {
     return ExitCode::kBadInput;
   }
   for (const std::string& warning : run->warnings) Complain(console, "warning: " + warning);
+  for (const std::string& advice : run->advice) Complain(console, "warning: " + advice);
   const auto line = Solve(request, *run);
   if (!line) {
-    Complain(console, request.run + "/" + Explain(line.error(), *run));
+    Complain(console, request.run + "/" + Explain(line.error(), run->setup));
     return ExitCode::kBadInput;
   }
-  auto fault = table.Write(Table(*line));
-  if (!fault && has_report) fault = report.Write(Report(request, *run, *line).dump(2) + "\n");
-  if (fault) {
+  if (const auto fault = files.Write(Table(*line), Report(request, *run, *line).dump(2) + "\n")) {
     Complain(console, *fault);
     return ExitCode::kBadInput;
   }
-  if (has_report) console.out << Summary(*line, *run);
+  if (files.has_report()) console.out << Summary(*line, *run);
   return ExitCode::kDone;
 }
 

@@ -26,6 +26,38 @@ constexpr const char* kLineHelp =
     "Example\n"
     "  tbm line run_0412 --out line.csv";
 
+constexpr const char* kTargetsHelp =
+    "RUN is a folder as for tbm line, with frames.csv (stamp_ns, file) instead of centres.csv, and "
+    "a "
+    "column\n"
+    "kind in targets.csv: led, circle:DIAMETER_MM, coded:NUMBER (ArUco 4x4_50) or\n"
+    "board:NAME:COLUMNSxROWS:POINT (inner corners row by row from 0), empty for a target that is "
+    "not "
+    "looked\n"
+    "for. Each target is looked for where the filter expects it after all that came before. One "
+    "row is "
+    "written\n"
+    "for each image point: stamp_ns, target, u_px, v_px, sigma_px. A target that two places fit is "
+    "left out.\n"
+    "Beside it a .json: how often each target was seen, and why it was not.\n"
+    "\n"
+    "Example\n"
+    "  tbm targets run_0412 --out run_0412/centres.csv && tbm line run_0412 --out line.csv";
+
+constexpr const char* kGroundHelp =
+    "RUN is a folder as for tbm line, with ground_frames.csv (stamp_ns, file) and a section "
+    "ground_camera in\n"
+    "rail.yaml. One row is written for each two images after each other:\n"
+    "  dx_m, dy_m   how far the unit moved, across the axis of the camera, by the height that "
+    "rail.yaml says\n"
+    "  sigma_m      of each\n"
+    "Height makes scale: tbm line estimates how far both are off. Beside it a .json: where nothing "
+    "could be\n"
+    "told, and why (no_texture, blurred, too_few_matches, not_a_plane).\n"
+    "\n"
+    "Example\n"
+    "  tbm ground run_0412 --out run_0412/displacement.csv && tbm line run_0412 --out line.csv";
+
 constexpr const char* kSettleHelp =
     "BASE and LATER are files of tbm line, of the same rail and in the same frame; LATER may be "
     "several, in\n"
@@ -75,6 +107,28 @@ CLI::App* AddLine(CLI::App& app, LineRequest& request) {
       ->capture_default_str();
   line->add_flag("--force,-f", request.force, "replace existing files");
   return line;
+}
+
+CLI::App* AddTargets(CLI::App& app, TargetsRequest& request) {
+  CLI::App* targets =
+      app.add_subcommand("targets", "Image points of surveyed targets in a trolley's images");
+  targets->footer(kTargetsHelp);
+  targets->add_option("RUN", request.run, "folder of the run")->required();
+  targets->add_option("--out,-o", request.out, "file to write; - is the standard output")
+      ->required();
+  targets->add_flag("--force,-f", request.force, "replace existing files");
+  return targets;
+}
+
+CLI::App* AddGround(CLI::App& app, GroundRequest& request) {
+  CLI::App* ground =
+      app.add_subcommand("ground", "How the ground went by in a trolley's images of it");
+  ground->footer(kGroundHelp);
+  ground->add_option("RUN", request.run, "folder of the run")->required();
+  ground->add_option("--out,-o", request.out, "file to write; - is the standard output")
+      ->required();
+  ground->add_flag("--force,-f", request.force, "replace existing files");
+  return ground;
 }
 
 CLI::App* AddSettle(CLI::App& app, SettleRequest& request) {

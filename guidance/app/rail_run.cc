@@ -31,6 +31,9 @@ constexpr std::array<std::string_view, 5> kTargetColumns = {
     "target", "x_m", "y_m", "z_m", "sigma_mm"};
 constexpr std::array<std::string_view, 8> kTruthColumns = {
     "stamp_ns", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"};
+constexpr std::array<std::string_view, 2> kFrameColumns = {"stamp_ns", "file"};
+constexpr std::array<std::string_view, 5> kGroundColumns = {
+    "from_ns", "to_ns", "dx_m", "dy_m", "sigma_m"};
 constexpr std::array<std::string_view, 2> kOdometerColumns = {"stamp_ns", "distance_m"};
 
 constexpr std::string_view kTiltSensor = "trolley";
@@ -42,25 +45,37 @@ class RailRunLoader {
  public:
   explicit RailRunLoader(const std::string& folder) : folder_(folder) {}
 
-  Result<RailRun, FileFaults> Load() {
+  Result<RailRun, FileFaults> Load(bool has_run) {
     std::error_code ignored;
     if (!fs::is_directory(folder_, ignored)) {
       return Failure{FileFaults{
           {folder_, 0, "", "is not a folder; a rail run is a folder with rail.yaml and imu.csv"}}};
     }
+    if (!has_run) return LoadBeforeRun();
     LoadSetup();
     LoadImu();
     LoadTilts();
     LoadTargets();
     LoadCentres();
+    LoadFrames("frames.csv", &run_.frames);
+    LoadFrames("ground_frames.csv", &run_.ground_frames);
     LoadOdometer();
+    LoadGrounds();
     LoadTruth();
     WarnOfUnused();
-    if (!faults_.empty()) return Failure{std::move(faults_)};
-    return std::move(run_);
+    return Whole();
   }
 
  private:
+  Result<RailRun, FileFaults> LoadBeforeRun() {
+    LoadSetup();
+    LoadTargets();
+    return Whole();
+  }
+  Result<RailRun, FileFaults> Whole() {
+    if (!faults_.empty()) return Failure{std::move(faults_)};
+    return std::move(run_);
+  }
   std::string PathOf(std::string_view name) const {
     return (fs::path(folder_) / fs::path(std::string(name))).string();
   }
@@ -248,7 +263,7 @@ class RailRunLoader {
             fmt::format("{} is not {}", Quoted(table->Field(row, sensor)), kTiltSensor)));
         return;
       }
-      TiltSample tilt;
+      TrolleyTilt tilt;
       double beta_deg = 0.0;
       double gamma_deg = 0.0;
       if (!Stamp(*table, row, false, &last, &tilt.sensed_at)) return;
@@ -288,7 +303,31 @@ class RailRunLoader {
         return;
       }
       run_.recording.targets.push_back(std::move(target));
+      if (!LoadMark(*table, row)) return;
     }
+  }
+
+  // The optional column `kind`; empty where nobody looks for the target in images.
+  bool LoadMark(const CsvTable& table, std::size_t row) {
+    const auto kind = table.Column("kind");
+    if (!kind) return true;
+    run_.marks.emplace_back();
+    if (table.Field(row, *kind).empty()) return true;
+    auto mark = ParseTargetMark(table.Field(row, *kind));
+    if (!mark) {
+      return Fault(table.FaultAt(
+          row, *kind, Quoted(table.Field(row, *kind)) + " is no kind: " + Advice(mark.error())));
+    }
+    if (!known_marks_.insert(NameOf(*mark)).second && mark->kind >= TargetKind::kCoded) {
+      return Fault(table.FaultAt(row, *kind, Quoted(NameOf(*mark)) + " stands twice"));
+    }
+    run_.marks.back() = std::move(mark).value();
+    return true;
+  }
+
+  static std::string NameOf(const TargetMark& mark) {
+    return mark.kind == TargetKind::kCoded ? fmt::format("coded:{}", mark.code)
+                                           : fmt::format("board:{}:{}", mark.board, mark.point);
   }
 
   void LoadCentres() {
@@ -327,6 +366,24 @@ class RailRunLoader {
     }
   }
 
+  void LoadFrames(std::string_view name, std::vector<RailFrameFile>* frames) {
+    if (!Has(name)) return;
+    const auto table = Table(name, kFrameColumns);
+    if (!table) return;
+    std::optional<Timestamp> last;
+    for (std::size_t row = 0; row < table->row_count(); ++row) {
+      RailFrameFile frame;
+      if (!Stamp(*table, row, false, &last, &frame.stamped_at)) return;
+      const std::size_t column = *table->Column("file");
+      frame.path = PathOf(table->Field(row, column));
+      if (table->Field(row, column).empty()) {
+        Fault(table->FaultAt(row, column, "is empty; it names an image, such as frames/0001.pgm"));
+        return;
+      }
+      frames->push_back(std::move(frame));
+    }
+  }
+
   void LoadOdometer() {
     if (!Has("odometer.csv")) return;
     const auto table = Table("odometer.csv", kOdometerColumns);
@@ -337,6 +394,36 @@ class RailRunLoader {
       if (!Stamp(*table, row, false, &last, &reading.sensed_at)) return;
       if (!Number(*table, row, "distance_m", &reading.distance_m)) return;
       run_.recording.odometer.push_back(reading);
+    }
+  }
+
+  void LoadGrounds() {
+    if (!Has("displacement.csv")) return;
+    const auto table = Table("displacement.csv", kGroundColumns);
+    if (!table) return;
+    for (std::size_t row = 0; row < table->row_count(); ++row) {
+      const auto from = table->Integer(row, *table->Column("from_ns"));
+      const auto to = table->Integer(row, *table->Column("to_ns"));
+      for (const auto* stamp : {&from, &to}) {
+        if (!*stamp) {
+          Fault(stamp->error());
+          return;
+        }
+      }
+      std::vector<GroundDisplacement>& grounds = run_.recording.grounds;
+      if (*to <= *from || (!grounds.empty() && *from < grounds.back().to.ns)) {
+        Fault(table->FaultAt(row,
+                             *table->Column("from_ns"),
+                             "must be before to_ns, and not before the last row's to_ns"));
+        return;
+      }
+      std::array<double, 3> v{};
+      if (!Numbers(*table, row, kGroundColumns, 2, v.data())) return;
+      if (!(v[2] > 0.0)) {
+        Fault(table->FaultAt(row, *table->Column("sigma_m"), "must be above 0"));
+        return;
+      }
+      grounds.push_back({{*from}, {*to}, {v[0], v[1]}, v[2]});
     }
   }
 
@@ -371,10 +458,27 @@ class RailRunLoader {
     if (!run_.recording.odometer.empty() && !setup.odometer) {
       unused("odometer.csv", "rail.yaml has no section odometer");
     }
-    if (Has("frames.csv")) unused("frames.csv", "image points come from centres.csv");
-    if (setup.camera && run_.recording.images.empty()) {
+    if (!run_.recording.grounds.empty() && !setup.ground) {
+      unused("displacement.csv", "rail.yaml has no section ground_camera");
+    }
+    if (!run_.ground_frames.empty() && !Has("displacement.csv")) {
+      run_.advice.push_back(
+          fmt::format("{}: how far the ground went by is not measured yet: tbm ground {} --out {}",
+                      PathOf("ground_frames.csv"),
+                      folder_,
+                      PathOf("displacement.csv")));
+    }
+    const bool has_frames_only = !run_.frames.empty() && !Has("centres.csv");
+    if (setup.camera && run_.recording.images.empty() && !has_frames_only) {
       run_.warnings.push_back(PathOf("centres.csv") +
                               ": there is no image point: no target is seen on this run");
+    }
+    if (has_frames_only) {
+      run_.advice.push_back(
+          fmt::format("{}: its targets are not found yet: tbm targets {} --out {}",
+                      PathOf("frames.csv"),
+                      folder_,
+                      PathOf("centres.csv")));
     }
   }
 
@@ -382,12 +486,17 @@ class RailRunLoader {
   RailRun run_;
   FileFaults faults_;
   std::map<std::string, int> target_at_;
+  std::set<std::string> known_marks_;
 };
 
 }  // namespace
 
 Result<RailRun, FileFaults> ReadRailRun(const std::string& folder) {
-  return RailRunLoader(folder).Load();
+  return RailRunLoader(folder).Load(true);
+}
+
+Result<RailRun, FileFaults> ReadRailSetup(const std::string& folder) {
+  return RailRunLoader(folder).Load(false);
 }
 
 }  // namespace tbm

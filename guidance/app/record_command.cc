@@ -93,8 +93,12 @@ using AllTopics = RecordedTopics<dds::FrameFeatures,
                                  dds::Guidance,
                                  dds::AlarmStatus,
                                  dds::Command,
-                                 dds::CommandReply>;
-static_assert(dds::kTopics.size() == 12, "a new topic has to be recorded");
+                                 dds::CommandReply,
+                                 dds::TrolleyState,
+                                 dds::RailLinePiece,
+                                 dds::SettlementPiece,
+                                 dds::CalibrationStatus>;
+static_assert(dds::kTopics.size() == 16, "a new topic has to be recorded");
 
 JournalOptions OptionsOf(const RecordRequest& request) {
   JournalOptions options;

@@ -17,6 +17,7 @@
 #include "guidance/app/completion.h"
 #include "guidance/app/journal_options.h"
 #include "guidance/app/rail_options.h"
+#include "guidance/app/rail_study_command.h"
 #include "guidance/app/solve_command.h"
 #include "guidance/app/study_command.h"
 #include "guidance/app/watch_command.h"
@@ -120,14 +121,21 @@ constexpr const char* kCheckHelp =
     "      every point that guidance and the log both know";
 
 constexpr const char* kStudyHelp =
-    "Repeats the simulation of the pose paper's section 4.1 (its lens and LEDs, 4 m, 0.1 to 1 px) "
+    "published: repeats the simulation of the pose paper's section 4.1 (its lens and LEDs, 4 m, "
+    "0.1 to 1 px) "
     "with the\n"
     "three estimators, and writes study.csv, study.txt, study_rmse.png and study_mean.png: the six "
     "panels of\n"
     "its Fig. 3 with the bound that no estimator can go below drawn in.\n"
     "\n"
-    "Example\n"
-    "  tbm study published --out published_study";
+    "rail: runs a trolley along the curve of the rail-line paper's Table 1 and writes "
+    "rail_study.csv and\n"
+    "rail_study.txt: what inertial measuring, the paper's filter and ours make of it, beside its "
+    "Table 2.\n"
+    "\n"
+    "Examples\n"
+    "  tbm study published --out published_study\n"
+    "  tbm study rail --out rail_study --draws 20";
 
 constexpr const char* kAskHelp =
     "The process answers: accepted (it takes a while), done, refused or failed, with a sentence.\n"
@@ -170,6 +178,8 @@ struct Requests {
   CalibrateRequests calibrate;
   JournalRequests journal;
   LineRequest line;
+  TargetsRequest targets;
+  GroundRequest ground;
   SettleRequest settle;
   GeometryRequest geometry;
   std::string align = "none";
@@ -177,6 +187,8 @@ struct Requests {
   std::string method = "fused";
   std::string shell;
   std::string study_name;
+  std::string study_out;
+  int study_draws = 0;
 };
 
 const std::map<std::string, PoseMethod> kMethods = {{"fused", PoseMethod::kFused},
@@ -257,16 +269,26 @@ CLI::App* AddStudy(CLI::App& app, Requests& requests) {
   study->footer(kStudyHelp);
   study->add_option("NAME", requests.study_name, "which study")
       ->required()
-      ->check(CLI::IsMember({"published"}));
-  study->add_option("--out,-o", request.out, "folder for the results")->capture_default_str();
-  study->add_option("--draws", request.draws, "random poses at each noise level")
-      ->check(CLI::Range(10, 10'000'000))
-      ->capture_default_str();
-  study->add_option("--seed", request.seed, "of the random poses")->capture_default_str();
+      ->check(CLI::IsMember({"published", "rail"}));
+  study->add_option(
+      "--out,-o", requests.study_out, "folder for the results; NAME_study unless given");
+  study
+      ->add_option(
+          "--draws", requests.study_draws, "random poses at each noise level (1000); runs (10)")
+      ->check(CLI::Range(1, 10'000'000));
+  study->add_option("--seed", request.seed, "of the random numbers")->capture_default_str();
   study->add_option("--threads", request.threads, "threads; 0: one per core")
       ->check(CLI::Range(0, 256));
   study->add_flag("--force,-f", request.force, "replace existing files");
   return study;
+}
+
+ExitCode RunNamedStudy(const Requests& requests, const Console& console) {
+  StudyRequest published = requests.study;
+  RailStudyRequest rail{.seed = published.seed, .force = published.force};
+  if (!requests.study_out.empty()) published.out = rail.out = requests.study_out;
+  if (requests.study_draws > 0) published.draws = rail.draws = requests.study_draws;
+  return requests.study_name == "rail" ? RunRailStudy(rail, console) : RunStudy(published, console);
 }
 
 CLI::App* AddWatch(CLI::App& app, Requests& requests) {
@@ -319,6 +341,8 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   const CLI::App* axis = AddAxis(app, requests.axis);
   const CLI::App* calibrate = AddCalibrate(app, requests.calibrate);
   const CLI::App* line = AddLine(app, requests.line);
+  const CLI::App* targets = AddTargets(app, requests.targets);
+  const CLI::App* ground = AddGround(app, requests.ground);
   const CLI::App* settle = AddSettle(app, requests.settle);
   const CLI::App* geometry = AddGeometry(app, requests.geometry);
   const CLI::App* study = AddStudy(app, requests);
@@ -351,9 +375,11 @@ ExitCode Dispatch(std::vector<std::string> arguments, const Console& console) {
   if (axis->parsed()) return RunAxis(*axis, requests.axis, console);
   if (calibrate->parsed()) return RunCalibrate(*calibrate, requests.calibrate, console);
   if (line->parsed()) return RunLine(requests.line, console);
+  if (targets->parsed()) return RunTargets(requests.targets, console);
+  if (ground->parsed()) return RunGround(requests.ground, console);
   if (settle->parsed()) return RunSettle(requests.settle, console);
   if (geometry->parsed()) return RunGeometry(requests.geometry, console);
-  if (study->parsed()) return RunStudy(requests.study, console);
+  if (study->parsed()) return RunNamedStudy(requests, console);
   if (watch->parsed()) return RunWatch(requests.watch, console);
   if (ask->parsed()) return RunAsk(requests.ask, console);
   if (record->parsed()) return RunRecord(requests.journal.record, console);

@@ -89,10 +89,22 @@ void WatchBoard::Add(const dds::StationSetUp& set_up, Instant received_at) {
 void WatchBoard::Add(const dds::AlarmStatus& alarm, Instant received_at) {
   guidance_.Add(alarm, received_at);
 }
+void WatchBoard::Add(const dds::TrolleyState& state, Instant received_at) {
+  rail_.Add(state, received_at);
+}
+void WatchBoard::Add(const dds::RailLinePiece& piece, Instant received_at) {
+  rail_.Add(piece, received_at);
+}
+void WatchBoard::Add(const dds::SettlementPiece& piece, Instant received_at) {
+  rail_.Add(piece, received_at);
+}
+void WatchBoard::Add(const dds::CalibrationStatus& status, Instant received_at) {
+  rail_.Add(status, received_at);
+}
 
 bool WatchBoard::is_empty() const {
-  return guidance_.is_empty() && poses_.empty() && tilts_.empty() && features_.empty() &&
-         health_.empty() && events_.empty();
+  return guidance_.is_empty() && rail_.is_empty() && poses_.empty() && tilts_.empty() &&
+         features_.empty() && health_.empty() && events_.empty();
 }
 
 void WatchBoard::AppendPoses(const WatchNow& now, std::vector<WatchRow>& rows) const {
@@ -232,6 +244,7 @@ std::vector<WatchRow> WatchBoard::Rows(const WatchNow& now) const {
   AppendPoses(now, rows);
   AppendTilts(now, rows);
   AppendFeatures(now, rows);
+  rail_.Append(now, rows);
   AppendHealth(now, rows);
   AppendEvents(now, rows);
   return rows;

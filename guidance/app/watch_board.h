@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "guidance/app/watch_guidance.h"
+#include "guidance/app/watch_rail.h"
 #include "guidance/app/watch_row.h"
 #include "idl/cpp/alarm.h"
 #include "idl/cpp/guidance_messages.h"
@@ -28,6 +29,10 @@ class WatchBoard {
   void Add(const dds::ShieldPose& pose, Instant received_at);
   void Add(const dds::StationSetUp& set_up, Instant received_at);
   void Add(const dds::AlarmStatus& alarm, Instant received_at);
+  void Add(const dds::TrolleyState& state, Instant received_at);
+  void Add(const dds::RailLinePiece& piece, Instant received_at);
+  void Add(const dds::SettlementPiece& piece, Instant received_at);
+  void Add(const dds::CalibrationStatus& status, Instant received_at);
 
   bool is_empty() const;
   std::vector<WatchRow> Rows(const WatchNow& now) const;
@@ -50,6 +55,7 @@ class WatchBoard {
   std::map<std::string, Heard<dds::Event>> events_;
   std::map<std::string, dds::Alarm> alarms_;
   GuidanceBoard guidance_;
+  RailBoard rail_;
 };
 
 // The rows as text for a terminal of the given width, colours included when wanted.
@@ -67,5 +73,9 @@ std::string WatchLine(const dds::Guidance& guidance, double age_s);
 std::string WatchLine(const dds::ShieldPose& pose, double age_s);
 std::string WatchLine(const dds::StationSetUp& set_up, double age_s);
 std::string WatchLine(const dds::AlarmStatus& alarm, double age_s);
+std::string WatchLine(const dds::TrolleyState& state, double age_s);
+std::string WatchLine(const dds::RailLinePiece& piece, double age_s);
+std::string WatchLine(const dds::SettlementPiece& piece, double age_s);
+std::string WatchLine(const dds::CalibrationStatus& status, double age_s);
 
 }  // namespace tbm

@@ -59,6 +59,10 @@ Timestamp TimeOf(const dds::Guidance& message) { return message.valid_at; }
 Timestamp TimeOf(const dds::ShieldPose& message) { return message.valid_at; }
 Timestamp TimeOf(const dds::StationSetUp& message) { return message.published_at; }
 Timestamp TimeOf(const dds::AlarmStatus& message) { return message.published_at; }
+Timestamp TimeOf(const dds::TrolleyState& message) { return message.published_at; }
+Timestamp TimeOf(const dds::RailLinePiece& message) { return message.published_at; }
+Timestamp TimeOf(const dds::SettlementPiece& message) { return message.published_at; }
+Timestamp TimeOf(const dds::CalibrationStatus& message) { return message.published_at; }
 
 // Meeting point of the DDS threads, which bring samples, and the one that shows them.
 class Inbox {
@@ -124,7 +128,11 @@ class Subscriptions {
         guidance_(participant, Into<dds::Guidance>(inbox)),
         shields_(participant, Into<dds::ShieldPose>(inbox)),
         set_ups_(participant, Into<dds::StationSetUp>(inbox)),
-        alarms_(participant, Into<dds::AlarmStatus>(inbox)) {}
+        alarms_(participant, Into<dds::AlarmStatus>(inbox)),
+        trolleys_(participant, Into<dds::TrolleyState>(inbox)),
+        lines_(participant, Into<dds::RailLinePiece>(inbox)),
+        settlements_(participant, Into<dds::SettlementPiece>(inbox)),
+        calibrations_(participant, Into<dds::CalibrationStatus>(inbox)) {}
 
  private:
   template <class Message>
@@ -143,6 +151,10 @@ class Subscriptions {
   dds::Subscriber<dds::ShieldPose> shields_;
   dds::Subscriber<dds::StationSetUp> set_ups_;
   dds::Subscriber<dds::AlarmStatus> alarms_;
+  dds::Subscriber<dds::TrolleyState> trolleys_;
+  dds::Subscriber<dds::RailLinePiece> lines_;
+  dds::Subscriber<dds::SettlementPiece> settlements_;
+  dds::Subscriber<dds::CalibrationStatus> calibrations_;
 };
 
 int TerminalWidth() {

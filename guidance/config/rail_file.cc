@@ -62,35 +62,60 @@ std::optional<TiltMounting> ReadTilt(const YamlNode& node) {
   return tilt;
 }
 
-std::optional<RailCamera> ReadCamera(const YamlNode& node) {
-  if (!IsSection(node)) return {};
-  YamlSection keys(node);
+// The lens of a camera, how it is turned and where it is in the imu frame.
+void ReadMountedCamera(const YamlNode& node,
+                       YamlSection* keys,
+                       CameraModel* model,
+                       Eigen::Quaterniond* camera_from_imu,
+                       Eigen::Vector3d* in_imu_m) {
   for (const char* key : {"image_width",
                           "image_height",
                           "distortion_model",
                           "camera_matrix",
                           "distortion_coefficients"}) {
-    (void)keys.Know(key);
+    (void)keys->Know(key);
   }
-  RailCamera camera;
   ReadCameraModel(
-      node, [](const YamlNode&, const std::set<std::string_view>&) {}, &camera.model);
+      node, [](const YamlNode&, const std::set<std::string_view>&) {}, model);
+  const auto rotation =
+      RotationOf(keys->Require("rotation", "nine numbers, row by row, imu frame into camera"));
+  if (rotation) *camera_from_imu = Eigen::Quaterniond(*rotation);
+  const auto position = keys->Require("position_m", "[x, y, z] of the camera in the imu frame")
+                            .Numbers(3, {-100.0, 100.0, "m"});
+  if (position) *in_imu_m = {(*position)[0], (*position)[1], (*position)[2]};
+}
+
+std::optional<RailCamera> ReadCamera(const YamlNode& node) {
+  if (!IsSection(node)) return {};
+  YamlSection keys(node);
+  RailCamera camera;
+  ReadMountedCamera(node, &keys, &camera.model, &camera.camera_from_imu, &camera.in_imu_m);
   const auto residual_px =
       keys.Require("residual_px", "sigma of one coordinate of an image point, e.g. 0.1")
           .Number({0.0, 100.0, "px", true});
   camera.residual_px = residual_px.value_or(1.0);
-  const auto rotation =
-      RotationOf(keys.Require("rotation", "nine numbers, row by row, imu frame into camera"));
-  if (rotation) camera.camera_from_imu = Eigen::Quaterniond(*rotation);
-  const auto position = keys.Require("position_m", "[x, y, z] of the camera in the imu frame")
-                            .Numbers(3, {-100.0, 100.0, "m"});
-  if (position) camera.in_imu_m = {(*position)[0], (*position)[1], (*position)[2]};
   double sigma_deg = 0.0;
   keys.Number("sigma_rotation_deg", 0.0, 10.0, "deg", &sigma_deg);
   camera.sigma_rotation_rad = DegToRad(sigma_deg);
   keys.Scaled("sigma_position_mm", 0.0, 1000.0, "mm", 1e3, &camera.sigma_position_m);
   keys.Number("time_offset_s", -1.0, 1.0, "s", &camera.time_offset_s);
   keys.Number("sigma_time_offset_s", 0.0, 1.0, "s", &camera.sigma_time_offset_s);
+  keys.RefuseOthers();
+  return camera;
+}
+
+std::optional<RailGroundCamera> ReadGroundCamera(const YamlNode& node) {
+  if (!IsSection(node)) return {};
+  YamlSection keys(node);
+  RailGroundCamera camera;
+  ReadMountedCamera(node, &keys, &camera.model, &camera.camera_from_imu, &camera.in_imu_m);
+  const auto height_m =
+      keys.Require("height_m", "of the camera over the ground, e.g. 0.5").Number({0.02, 10.0, "m"});
+  camera.height_m = height_m.value_or(1.0);
+  const auto sigma_mm = keys.Require("sigma_height_mm", "how well that is known, e.g. 5")
+                            .Number({0.0, 1000.0, "mm", true});
+  camera.sigma_height_m = 1e-3 * sigma_mm.value_or(1.0);
+  keys.Scaled("sigma_mm", 0.0, 1000.0, "mm", 1e3, &camera.sigma_m);
   keys.RefuseOthers();
   return camera;
 }
@@ -158,7 +183,8 @@ void ReadStart(const YamlNode& node, RailStart* start) {
 RailSetup Read(const YamlNode& root) {
   RailSetup setup;
   if (!root.IsMap()) {
-    root.Fault("is not a map with gravity_m_s2, imu, tilt, camera, odometer and start");
+    root.Fault(
+        "is not a map with gravity_m_s2, imu, tilt, camera, odometer, ground_camera and start");
     return setup;
   }
   YamlSection keys(root);
@@ -167,6 +193,7 @@ RailSetup Read(const YamlNode& root) {
   setup.tilt = ReadTilt(keys.Know("tilt"));
   setup.camera = ReadCamera(keys.Know("camera"));
   setup.odometer = ReadOdometer(keys.Know("odometer"));
+  setup.ground = ReadGroundCamera(keys.Know("ground_camera"));
   ReadStart(keys.Require("start", "where the run begins and how long it rests"), &setup.start);
   keys.RefuseOthers();
   return setup;

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "guidance/fusion/fusion_smoother.h"
-#include "guidance/fusion/rest_update.h"
 #include "guidance/fusion/target_modes.h"
 #include "pose/base/angle.h"
 #include "pose/geometry/rigid3.h"
@@ -14,84 +13,8 @@
 namespace tbm {
 namespace {
 
-// The covariance is brought forward at least so often.
-constexpr Duration kLongestEpoch = std::chrono::milliseconds(100);
-// A sample that ends later than one and a half periods after the one before leaves a gap.
-constexpr double kGapPeriods = 1.5;
-// What may have happened while samples are missing.
-constexpr double kGapForce_m_s2 = 0.5;
-constexpr double kGapRate_rad_s = 0.05;
-constexpr double kHeld_s = 1.0;
-constexpr double kStill_m_s = 0.003;
-// How well the start is known before the filter begins: so badly that the same readings, when the
-// filter takes them, are not counted twice.
-constexpr double kStartLevel_rad = 2e-3;
-constexpr double kStartHeading_rad = 5e-3;
-constexpr double kStartVelocity_m_s = 1e-3;
 // The state is no better for it than it was.
 constexpr double kToldNothing = 0.9;
-
-std::vector<FusionOption> OptionsOf(const RailSetup& setup) {
-  std::vector<FusionOption> options;
-  if (setup.camera) {
-    options = {
-        FusionOption::kTimeOffset, FusionOption::kCameraRotation, FusionOption::kCameraPosition};
-  }
-  if (setup.odometer) options.push_back(FusionOption::kOdometerScale);
-  return options;
-}
-
-struct Prior {
-  FusionLayout layout;
-  FusionState state;
-  FusionMatrix covariance;
-};
-
-Prior MakePrior(const RailSetup& setup, const Eigen::Quaterniond& world_from_imu, int modes) {
-  Prior prior;
-  prior.layout = FusionLayout(OptionsOf(setup), modes);
-  FusionState& state = prior.state;
-  state.motion.position_world_m = setup.start.position_world_m;
-  state.motion.world_from_imu = world_from_imu;
-  FusionVector sigma = FusionVector::Zero(prior.layout.size());
-  sigma.segment<3>(FusionLayout::kPosition).setConstant(setup.start.sigma_position_m);
-  sigma.segment<3>(FusionLayout::kVelocity).setConstant(kStartVelocity_m_s);
-  sigma.segment<3>(FusionLayout::kGyroBias)
-      .setConstant(std::hypot(setup.imu.gyro_bias_sigma_rad_s, kEarthRate_rad_s));
-  sigma.segment<3>(FusionLayout::kAccelBias).setConstant(setup.imu.accel_bias_sigma_m_s2);
-  if (setup.camera) {
-    const RailCamera& camera = *setup.camera;
-    state.time_offset_s = camera.time_offset_s;
-    state.camera_from_imu = camera.camera_from_imu;
-    state.camera_in_imu_m = camera.in_imu_m;
-    sigma[prior.layout.At(FusionOption::kTimeOffset)] = camera.sigma_time_offset_s;
-    sigma.segment<3>(prior.layout.At(FusionOption::kCameraRotation))
-        .setConstant(camera.sigma_rotation_rad);
-    sigma.segment<3>(prior.layout.At(FusionOption::kCameraPosition))
-        .setConstant(camera.sigma_position_m);
-  }
-  if (setup.odometer) {
-    sigma[prior.layout.At(FusionOption::kOdometerScale)] = setup.odometer->sigma_scale;
-  }
-  state.modes.setZero(modes);
-  if (modes > 0) sigma.tail(modes).setOnes();
-  // What is exactly known is known to a millionth of what matters.
-  sigma = sigma.cwiseMax(1e-9);
-  prior.covariance = sigma.cwiseAbs2().asDiagonal();
-  // Level is known better than heading; both about the axes of the world.
-  const Eigen::Matrix3d imu_from_world = world_from_imu.conjugate().toRotationMatrix();
-  const double level_rad =
-      setup.tilt
-          ? kStartLevel_rad
-          : std::hypot(kStartLevel_rad, setup.imu.accel_bias_sigma_m_s2 / setup.gravity_m_s2);
-  const double seen_rad =
-      std::hypot(kStartHeading_rad, setup.camera ? setup.camera->sigma_rotation_rad : 0.0);
-  const double heading_rad = setup.start.heading_rad ? setup.start.sigma_heading_rad : seen_rad;
-  const Eigen::Vector3d attitude(level_rad, level_rad, heading_rad);
-  prior.covariance.block<3, 3>(FusionLayout::kAttitude, FusionLayout::kAttitude) =
-      imu_from_world * attitude.cwiseAbs2().asDiagonal() * imu_from_world.transpose();
-  return prior;
-}
 
 // Filters a recording once, from its first sample to its last.
 class Run {
@@ -100,187 +23,27 @@ class Run {
       const RailRecording& recording,
       const std::vector<SurveyedTarget>& targets,
       const std::vector<RestSpan>& rests,
-      const Prior& prior)
-      : setup_(setup),
-        recording_(recording),
-        targets_(targets),
-        rests_(rests),
-        begin_(recording.imu.front().ends_at -
-               Duration(std::llround(recording.imu.front().interval_s * 1e9))),
-        filter_(prior.layout,
-                prior.state,
-                prior.covariance,
-                setup.imu.noise,
-                setup.gravity_m_s2,
-                begin_),
-        smoother_(prior.layout) {}
-
-  void Go(RailLine* line) {
-    line_ = line;
-    EndEpoch();
-    for (const ImuSample& sample : recording_.imu) {
-      const double span_s = SecondsBetween(filter_.now(), sample.ends_at);
-      const bool is_gap = span_s > kGapPeriods / setup_.imu.rate_hz;
-      if (is_gap) gaps_.push_back({filter_.now(), sample.ends_at});
-      gap_s_ = is_gap ? span_s : 0.0;
-      while (NextStamp() < sample.ends_at) Advance(sample, NextStamp());
-      Advance(sample, sample.ends_at);
+      const RailPrior& prior)
+      : smoother_(prior.layout),
+        filter_(setup, targets, rests, prior, BeginOfRun(recording.imu.front()), &smoother_) {
+    for (const TrolleyTilt& tilt : recording.tilts) filter_.Add(tilt);
+    for (const TargetImage& image : recording.images) filter_.Add(image);
+    for (std::size_t i = 1; i < recording.odometer.size(); ++i) {
+      filter_.Add(OdometerSpan{recording.odometer[i - 1], recording.odometer[i]});
     }
-    if (smoother_.at(smoother_.size() - 1) < filter_.now()) EndEpoch();
-    for (; tilt_ < recording_.tilts.size(); ++tilt_) {
-      Outside(recording_.tilts[tilt_].sensed_at, FusionUpdate::kTilt);
-    }
-    for (; image_ < recording_.images.size(); ++image_) {
-      Outside(recording_.images[image_].stamped_at, FusionUpdate::kTargets);
-    }
-    for (; wheel_ < recording_.odometer.size(); ++wheel_) {
-      Outside(MiddleOf(wheel_), FusionUpdate::kOdometer);
-    }
+    for (const GroundDisplacement& ground : recording.grounds) filter_.Add(ground);
+    for (const ImuSample& sample : recording.imu) filter_.Feed(sample);
+    filter_.Finish();
   }
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
 
   const FusionSmoother& smoother() const { return smoother_; }
-  const std::vector<RestSpan>& gaps() const { return gaps_; }
-  // When the position was held by something outside of the unit, in the order of time.
-  const std::vector<Timestamp>& fixes() const { return fixes_; }
+  RailFilter& filter() { return filter_; }
 
  private:
-  // The next stamp that has to be an epoch.
-  Timestamp NextStamp() const {
-    Timestamp next = smoother_.at(smoother_.size() - 1) + kLongestEpoch;
-    if (tilt_ < recording_.tilts.size()) {
-      next = std::min(next, recording_.tilts[tilt_].sensed_at);
-    }
-    if (image_ < recording_.images.size()) {
-      next = std::min(next, recording_.images[image_].stamped_at);
-    }
-    if (wheel_ < recording_.odometer.size()) next = std::min(next, MiddleOf(wheel_));
-    return next;
-  }
-
-  // Between two readings the wheel has run with its mean speed, as it had it half way.
-  Timestamp MiddleOf(std::size_t reading) const {
-    const Timestamp before = recording_.odometer[reading - 1].sensed_at;
-    return before + Duration((recording_.odometer[reading].sensed_at - before).count() / 2);
-  }
-
-  void Advance(const ImuSample& sample, Timestamp to) {
-    if (to > filter_.now()) {
-      ImuSample part = sample;
-      part.interval_s = SecondsBetween(filter_.now(), to);
-      part.ends_at = to;
-      if (gap_s_ > 0.0) {
-        // Also a trolley that rested may have been moved meanwhile.
-        ImuNoise unknown = setup_.imu.noise;
-        unknown.angle_random_walk_rad = kGapRate_rad_s * std::sqrt(gap_s_);
-        unknown.velocity_random_walk_m_s = kGapForce_m_s2 * std::sqrt(gap_s_);
-        filter_.Feed(part, unknown);
-      } else if (rests_now_ && SaysRest(to)) {
-        filter_.Hold(part);
-      } else {
-        filter_.Feed(part);
-      }
-    }
-    if (NextStamp() <= to) EndEpoch();
-  }
-
-  // What the start declares, or the samples show.
-  bool SaysRest(Timestamp at) const {
-    if (SecondsBetween(begin_, at) <= setup_.start.at_rest_s) return true;
-    return std::any_of(rests_.begin(), rests_.end(), [&](const RestSpan& span) {
-      return span.begins_at <= at && at <= span.ends_at;
-    });
-  }
-
-  void EndEpoch() {
-    const Timestamp now = filter_.now();
-    filter_.BringForward();
-    smoother_.Before(filter_);
-    rests_now_ = false;
-    if (SaysRest(now)) {
-      const FusionVerdict verdict = UpdateByRest(filter_, {});
-      Count(verdict);
-      rests_now_ = verdict.accepted;
-    }
-    if (rests_now_) fixes_.push_back(now);
-    while (tilt_ < recording_.tilts.size() && recording_.tilts[tilt_].sensed_at <= now) {
-      const TiltSample& tilt = recording_.tilts[tilt_++];
-      if (!setup_.tilt) continue;
-      if (tilt.sensed_at < now) {
-        Outside(tilt.sensed_at, FusionUpdate::kTilt);
-        continue;
-      }
-      Count(UpdateByTilt(filter_, *setup_.tilt, tilt.angles, rests_now_));
-    }
-    while (image_ < recording_.images.size() && recording_.images[image_].stamped_at <= now) {
-      const TargetImage& image = recording_.images[image_++];
-      if (!setup_.camera) continue;
-      if (image.stamped_at < now) {
-        Outside(image.stamped_at, FusionUpdate::kTargets);
-        continue;
-      }
-      const TargetsVerdict outcome = UpdateByTargets(
-          filter_, setup_.camera->model, setup_.camera->residual_px, targets_, image.pixels);
-      Count(outcome.verdict);
-      for (const RejectedPixel& rejected : outcome.rejected) {
-        line_->rejections.push_back({now,
-                                     targets_[static_cast<std::size_t>(rejected.target)].name,
-                                     std::string(rejected.why_not)});
-      }
-      if (outcome.verdict.accepted) fixes_.push_back(now);
-    }
-    while (wheel_ < recording_.odometer.size() && MiddleOf(wheel_) <= now) TakeWheel(wheel_++);
-    smoother_.After(filter_);
-  }
-
-  void TakeWheel(std::size_t reading) {
-    if (!setup_.odometer) return;
-    const Timestamp at = MiddleOf(reading);
-    if (at < filter_.now()) return Outside(at, FusionUpdate::kOdometer);
-    const OdometerReading& from = recording_.odometer[reading - 1];
-    const OdometerReading& to = recording_.odometer[reading];
-    const double span_s = SecondsBetween(from.sensed_at, to.sensed_at);
-    OdometerMounting mounting = setup_.odometer->mounting;
-    mounting.sigma_m_s = std::sqrt(2.0) * setup_.odometer->sigma_m / span_s;
-    Count(UpdateByOdometer(filter_, mounting, (to.distance_m - from.distance_m) / span_s));
-  }
-
-  // Before the first sample or after the last.
-  void Outside(Timestamp at, FusionUpdate update) {
-    FusionVerdict verdict;
-    verdict.update = update;
-    verdict.sensed_at = at;
-    verdict.why_not = "outside_of_samples";
-    Count(verdict);
-  }
-
-  void Count(const FusionVerdict& verdict) {
-    RailConsistency& kind = line_->consistency[static_cast<std::size_t>(verdict.update)];
-    ++kind.given;
-    if (!verdict.accepted) {
-      line_->rejections.push_back(
-          {verdict.sensed_at, std::string(Word(verdict.update)), std::string(verdict.why_not)});
-      return;
-    }
-    ++kind.accepted;
-    kind.nis += verdict.nis;
-    kind.dof += verdict.dof;
-  }
-
-  const RailSetup& setup_;
-  const RailRecording& recording_;
-  const std::vector<SurveyedTarget>& targets_;
-  const std::vector<RestSpan>& rests_;
-  const Timestamp begin_;
-  FusionFilter filter_;
   FusionSmoother smoother_;
-  RailLine* line_ = nullptr;
-  bool rests_now_ = false;  // since the last epoch
-  double gap_s_ = 0.0;      // that the present sample stands for; 0: it is one like all
-  std::size_t tilt_ = 0;
-  std::size_t image_ = 0;
-  std::size_t wheel_ = 1;
-  std::vector<RestSpan> gaps_;
-  std::vector<Timestamp> fixes_;
+  RailFilter filter_;
 };
 
 // What the line needs of an epoch.
@@ -397,7 +160,7 @@ void FillStatus(const std::vector<Timestamp>& fixes,
   }
 }
 
-void FillEstimates(const FusionEpoch& last, const Prior& prior, RailLine* line) {
+void FillEstimates(const FusionEpoch& last, const RailPrior& prior, RailLine* line) {
   const auto add = [&](std::string what, int row, double value, std::string_view motion) {
     const double sigma = std::sqrt(last.covariance(row, row));
     const double sigma_before = std::sqrt(prior.covariance(row, row));
@@ -450,6 +213,12 @@ void FillEstimates(const FusionEpoch& last, const Prior& prior, RailLine* line) 
         state.odometer_scale,
         "a stretch between targets, or between places that are known");
   }
+  if (layout.Has(FusionOption::kImageScale)) {
+    add("ground_height_scale",
+        layout.At(FusionOption::kImageScale),
+        state.image_scale,
+        "a stretch between targets, or between places that are known");
+  }
 }
 
 std::vector<TargetView> ViewsOf(const std::vector<Knot>& knots, const RailRecording& recording) {
@@ -499,9 +268,7 @@ Result<RailLine, RailStartFailure> SolveRailLine(const RailSetup& setup,
   std::vector<SurveyedTarget> targets = recording.targets;
   TargetModes modes;
   if (setup.camera && !recording.images.empty()) {
-    RailLine ignored;
-    Run first(setup, recording, targets, rests, MakePrior(setup, *attitude, 0));
-    first.Go(&ignored);
+    const Run first(setup, recording, targets, rests, MakeRailPrior(setup, *attitude, 0));
     const auto views = ViewsOf(KnotsOf(first.smoother(), RailMethod::kSmoothed), recording);
     modes = FindTargetModes(
         views, setup.camera->model, setup.camera->residual_px, FusionLayout::kMostModes, &targets);
@@ -509,9 +276,10 @@ Result<RailLine, RailStartFailure> SolveRailLine(const RailSetup& setup,
   RailLine line;
   line.target_modes = static_cast<std::size_t>(modes.count);
   line.target_modes_left_out_m = modes.left_out_m;
-  const Prior prior = MakePrior(setup, *attitude, modes.count);
+  const RailPrior prior = MakeRailPrior(setup, *attitude, modes.count);
   Run run(setup, recording, targets, rests, prior);
-  run.Go(&line);
+  line.consistency = run.filter().consistency();
+  line.rejections = run.filter().TakeRejections();
   const std::vector<Knot> knots = KnotsOf(run.smoother(), method);
 
   line.points.reserve(recording.imu.size());
@@ -534,7 +302,7 @@ Result<RailLine, RailStartFailure> SolveRailLine(const RailSetup& setup,
             .matrix();
   }
   FillDistance(knots, &line.points);
-  FillStatus(run.fixes(), run.gaps(), method, &line.points);
+  FillStatus(run.filter().fixes(), run.filter().gaps(), method, &line.points);
   FillEstimates(run.smoother().Filtered(run.smoother().size() - 1), prior, &line);
   return line;
 }

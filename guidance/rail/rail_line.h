@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "guidance/rail/rail_filter.h"
 #include "guidance/rail/rail_recording.h"
 #include "guidance/rail/rail_start.h"
 #include "pose/base/result.h"
@@ -43,20 +44,6 @@ struct RailEstimate {
   double sigma_before = 0.0;
   // The run has told nothing of it; what motion would. Empty when it has.
   std::string missing_motion;
-};
-
-// All measurements of a kind together.
-struct RailConsistency {
-  std::size_t given = 0;
-  std::size_t accepted = 0;
-  double nis = 0.0;  // sum over the accepted
-  double dof = 0.0;
-};
-
-struct RailRejection {
-  Timestamp at;
-  std::string what;     // target, or kind of the measurement
-  std::string why_not;  // code
 };
 
 struct RailLine {

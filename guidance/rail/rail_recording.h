@@ -12,6 +12,7 @@
 #include "guidance/fusion/target_pixels.h"
 #include "guidance/fusion/tilt_update.h"
 #include "pose/geometry/camera_model.h"
+#include "pose/geometry/rigid3.h"
 
 namespace tbm {
 
@@ -37,6 +38,15 @@ struct RailOdometer {
   double sigma_m = 0.0;       // of one reading, > 0
   double sigma_scale = 0.0;   // of true distance over told distance
 };
+// Looks at the ground beside the rail.
+struct RailGroundCamera {
+  CameraModel model;
+  Eigen::Quaterniond camera_from_imu = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d in_imu_m = Eigen::Vector3d::Zero();
+  double height_m = 0.0;        // over the ground, > 0
+  double sigma_height_m = 0.0;  // of it, > 0; the same along the whole run
+  double sigma_m = 0.0;         // of a displacement, beside what its images say
+};
 struct RailStart {
   Eigen::Vector3d position_world_m = Eigen::Vector3d::Zero();  // of the unit
   double sigma_position_m = 0.0;
@@ -50,10 +60,11 @@ struct RailSetup {
   std::optional<TiltMounting> tilt;
   std::optional<RailCamera> camera;
   std::optional<RailOdometer> odometer;
+  std::optional<RailGroundCamera> ground;
   RailStart start;
 };
 
-struct TiltSample {
+struct TrolleyTilt {
   Timestamp sensed_at;
   TiltAngles angles;
 };
@@ -67,13 +78,30 @@ struct OdometerReading {
   double distance_m = 0.0;  // since any beginning, forwards positive
 };
 
+// How far the unit moved between two images of the ground.
+struct GroundDisplacement {
+  Timestamp from;
+  Timestamp to;  // later
+  Eigen::Vector2d told_m =
+      Eigen::Vector2d::Zero();  // GroundVehicle's x and y, by the set-up's height
+  double sigma_m = 0.0;         // of each, > 0
+};
+
+// vehicle_from_imu: z against the axis of the camera that looks at the ground. Along x and y the
+// image tells how the ground moves.
+inline Eigen::Quaterniond GroundVehicle(const RailGroundCamera& camera) {
+  return TurnBetween(camera.camera_from_imu.conjugate() * Eigen::Vector3d::UnitZ(),
+                     -Eigen::Vector3d::UnitZ());
+}
+
 // One run, each list in the order of time.
 struct RailRecording {
   std::vector<ImuSample> imu;
-  std::vector<TiltSample> tilts;
+  std::vector<TrolleyTilt> tilts;
   std::vector<TargetImage> images;
   std::vector<SurveyedTarget> targets;
   std::vector<OdometerReading> odometer;
+  std::vector<GroundDisplacement> grounds;  // each begins when the one before has ended, or later
 };
 
 }  // namespace tbm

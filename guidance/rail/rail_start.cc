@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "guidance/rail/quiet_watch.h"
 #include "pose/base/angle.h"
 #include "pose/geometry/rigid3.h"
 
@@ -13,13 +14,6 @@ namespace tbm {
 namespace {
 
 constexpr double kLeastRest_s = 2.0;
-constexpr double kWindow_s = 0.25;
-// A window whose mean is off by so many sigma of a mean, or whose spread is so many times the
-// unit's, is no rest.
-constexpr double kMostMeanSigmas = 7.0;
-constexpr double kMostSpread = 2.0;
-constexpr double kMostForceOff_m_s2 = 0.02;
-constexpr double kLeastQuiet_s = 1.0;
 constexpr std::size_t kStartImages = 5;
 // Of the noise of the other axes.
 constexpr double kFrozen = 1e-6;
@@ -27,55 +21,6 @@ constexpr double kFrozen = 1e-6;
 constexpr double kMostBias = 8.0;
 
 Failure<RailStartFailure> Fail(const RailStartFailure& failure) { return {failure}; }
-
-struct Mean {
-  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
-  Eigen::Vector3d accel = Eigen::Vector3d::Zero();
-  Eigen::Vector3d gyro_sigma = Eigen::Vector3d::Zero();
-  Eigen::Vector3d accel_sigma = Eigen::Vector3d::Zero();
-};
-
-Mean MeanOf(const std::vector<ImuSample>& imu, std::size_t begin, std::size_t end) {
-  Mean mean;
-  const double count = static_cast<double>(end - begin);
-  for (std::size_t i = begin; i < end; ++i) {
-    mean.gyro += imu[i].gyro_rad_s / count;
-    mean.accel += imu[i].accel_m_s2 / count;
-  }
-  for (std::size_t i = begin; i < end; ++i) {
-    mean.gyro_sigma += (imu[i].gyro_rad_s - mean.gyro).cwiseAbs2() / count;
-    mean.accel_sigma += (imu[i].accel_m_s2 - mean.accel).cwiseAbs2() / count;
-  }
-  mean.gyro_sigma = mean.gyro_sigma.cwiseSqrt();
-  mean.accel_sigma = mean.accel_sigma.cwiseSqrt();
-  return mean;
-}
-
-bool IsNear(const Eigen::Vector3d& mean,
-            const Eigen::Vector3d& rest_mean,
-            const Eigen::Vector3d& rest_sigma,
-            double samples) {
-  const Eigen::Array3d limit = kMostMeanSigmas * rest_sigma.array() / std::sqrt(samples);
-  return ((mean - rest_mean).array().abs() <= limit).all();
-}
-
-// Whether a window shows no more than the unit's noise, and no rate but its bias.
-bool IsQuiet(const Mean& window, const RestSignature& rest, double samples) {
-  const bool is_even =
-      (window.gyro_sigma.array() <= kMostSpread * rest.sigma_gyro_rad_s.array()).all() &&
-      (window.accel_sigma.array() <= kMostSpread * rest.sigma_accel_m_s2.array()).all();
-  return is_even && IsNear(window.gyro, rest.mean_gyro_rad_s, rest.sigma_gyro_rad_s, samples);
-}
-
-// Where the rail is canted the axes feel gravity otherwise, but no more and no less of it, but for
-// what their biases change.
-bool FeelsGravityAlone(const Mean& window, const RestSignature& rest) {
-  return std::abs(window.accel.norm() - rest.mean_accel_m_s2.norm()) < kMostForceOff_m_s2;
-}
-
-std::size_t WindowSamples(const RailSetup& setup) {
-  return std::max<std::size_t>(8, static_cast<std::size_t>(kWindow_s * setup.imu.rate_hz));
-}
 
 Timestamp BeginOf(const ImuSample& sample) {
   return sample.ends_at - Duration(static_cast<std::int64_t>(sample.interval_s * 1e9));
@@ -127,7 +72,7 @@ Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup
   }
   // The first second alone says what rest looks like: later ones are held against it.
   const auto first_second = std::min(end, static_cast<std::size_t>(setup.imu.rate_hz));
-  const Mean first = MeanOf(imu, 0, first_second);
+  const QuietMean first = MeanOf(imu, 0, first_second);
   for (int axis = 0; axis < 3; ++axis) {
     if (first.gyro_sigma[axis] <= kFrozen * first.gyro_sigma.maxCoeff()) {
       return Fail({.fault = RailStartFault::kFrozen, .axis = axis});
@@ -141,9 +86,9 @@ Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup
   const bool is_wrong_rate = first.gyro_sigma.minCoeff() > 20.0 * expected;
   const bool is_wrong_force = std::abs(gravity / setup.gravity_m_s2 - 1.0) > 0.1;
   RestSignature signature{first.gyro, first.accel, first.gyro_sigma, first.accel_sigma};
-  const std::size_t window = WindowSamples(setup);
+  const std::size_t window = QuietWindowSamples(setup);
   for (std::size_t at = 0; at + window <= end; at += window) {
-    const Mean mean = MeanOf(imu, at, at + window);
+    const QuietMean mean = MeanOf(imu, at, at + window);
     const auto samples = static_cast<double>(window);
     if (IsQuiet(mean, signature, samples) &&
         IsNear(mean.accel, signature.mean_accel_m_s2, signature.sigma_accel_m_s2, samples)) {
@@ -159,7 +104,7 @@ Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup
   if (is_wrong_force) {
     return Fail({.fault = RailStartFault::kWrongForce, .times = gravity / setup.gravity_m_s2});
   }
-  const Mean all = MeanOf(imu, 0, end);
+  const QuietMean all = MeanOf(imu, 0, end);
   const double bias_rad_s = std::hypot(setup.imu.gyro_bias_sigma_rad_s, kEarthRate_rad_s);
   for (int axis = 0; axis < 3; ++axis) {
     const double times = std::abs(all.gyro[axis]) / bias_rad_s;
@@ -177,7 +122,7 @@ Result<Eigen::Quaterniond, RailStartFailure> FindStartAttitude(const RailSetup& 
   if (setup.tilt && !recording.tilts.empty()) {
     const Timestamp begin = BeginOf(recording.imu.front());
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (const TiltSample& tilt : recording.tilts) {
+    for (const TrolleyTilt& tilt : recording.tilts) {
       if (SecondsBetween(begin, tilt.sensed_at) > setup.start.at_rest_s) break;
       const double x = -std::sin(tilt.angles.beta_rad);
       const double y = std::sin(tilt.angles.gamma_rad);
@@ -228,33 +173,9 @@ Result<Eigen::Quaterniond, RailStartFailure> FindStartAttitude(const RailSetup& 
 std::vector<RestSpan> FindQuietSpans(const RailSetup& setup,
                                      const RailRecording& recording,
                                      const RestSignature& rest) {
-  const std::vector<ImuSample>& imu = recording.imu;
-  const std::size_t window = WindowSamples(setup);
-  std::vector<RestSpan> spans;
-  std::size_t begin = 0;
-  bool is_in = false;
-  const auto close = [&](std::size_t end) {
-    is_in = false;
-    // Its first and last window may hold the end or the begin of the motion.
-    if (end < begin + 3 * window) return;
-    const RestSpan span{imu[begin + window].ends_at, imu[end - window].ends_at};
-    if (SecondsBetween(span.begins_at, span.ends_at) >= kLeastQuiet_s - 2.0 * kWindow_s) {
-      spans.push_back(span);
-    }
-  };
-  std::size_t at = 0;
-  for (; at + window <= imu.size(); at += window) {
-    const Mean mean = MeanOf(imu, at, at + window);
-    const bool is_quiet =
-        IsQuiet(mean, rest, static_cast<double>(window)) && FeelsGravityAlone(mean, rest);
-    if (is_quiet && !is_in) {
-      begin = at;
-      is_in = true;
-    }
-    if (!is_quiet && is_in) close(at);
-  }
-  if (is_in) close(at);
-  return spans;
+  QuietWatch watch(setup, rest);
+  for (const ImuSample& sample : recording.imu) watch.Feed(sample);
+  return watch.spans();
 }
 
 }  // namespace tbm

@@ -58,6 +58,14 @@ std::size_t ChannelOf() {
   return channel;
 }
 
+// What is not, is passed on to who reads the topics themselves.
+template <class Message>
+constexpr bool IsShown() {
+  return requires(ConsoleBoard & board, const Message& message, const Arrival& arrival) {
+    board.Add(message, arrival, hmi::Moment{});
+  };
+}
+
 }  // namespace
 
 class BridgeProcess::Impl {
@@ -94,6 +102,10 @@ class BridgeProcess::Impl {
     Hear(alarms_);
     Hear(commands_in_);
     Hear(replies_);
+    Hear(trolleys_);
+    Hear(line_pieces_);
+    Hear(settlements_);
+    Hear(calibrations_);
   }
 
   void StopListening() {
@@ -109,6 +121,10 @@ class BridgeProcess::Impl {
     alarms_.reset();
     commands_in_.reset();
     replies_.reset();
+    trolleys_.reset();
+    line_pieces_.reset();
+    settlements_.reset();
+    calibrations_.reset();
     server_ = nullptr;
   }
 
@@ -228,6 +244,10 @@ class BridgeProcess::Impl {
     AppendSamples(alarms_, &text);
     AppendSamples(commands_in_, &text);
     AppendSamples(replies_, &text);
+    AppendSamples(trolleys_, &text);
+    AppendSamples(line_pieces_, &text);
+    AppendSamples(settlements_, &text);
+    AppendSamples(calibrations_, &text);
     return text;
   }
 
@@ -252,7 +272,7 @@ class BridgeProcess::Impl {
     append("other_interface", counters.from_other_interface);
     append("lost", counters.lost);
   }
-  static_assert(dds::kTopics.size() == 12, "a new topic has to be heard");
+  static_assert(dds::kTopics.size() == 16, "a new topic has to be heard");
 
   hmi::Moment Moment() const { return {clock_.Now(), SteadyMs(clock_.Steady())}; }
 
@@ -260,7 +280,7 @@ class BridgeProcess::Impl {
   void Hear(Input<Message>& input) {
     input.emplace(participant_, [this](const Message& message, const dds::SampleFacts& facts) {
       const Arrival arrival{SteadyMs(facts.received_at), facts.contested};
-      if constexpr (!std::is_same_v<Message, dds::Command>) {
+      if constexpr (IsShown<Message>()) {
         const std::lock_guard lock(mutex_);
         board_.Add(message, arrival, Moment());
       }
@@ -345,6 +365,10 @@ class BridgeProcess::Impl {
   Input<dds::AlarmStatus> alarms_;
   Input<dds::Command> commands_in_;
   Input<dds::CommandReply> replies_;
+  Input<dds::TrolleyState> trolleys_;
+  Input<dds::RailLinePiece> line_pieces_;
+  Input<dds::SettlementPiece> settlements_;
+  Input<dds::CalibrationStatus> calibrations_;
 };
 
 BridgeProcess::BridgeProcess(ConsoleMachine machine,

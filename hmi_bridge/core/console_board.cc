@@ -21,7 +21,7 @@ constexpr std::size_t kMostTargets = 64;
 constexpr std::size_t kMostAxisPoints = 4000;
 constexpr double kAxisStep_m = 5.0;
 
-constexpr std::array<std::string_view, 11> kPartNames = {"bridge",
+constexpr std::array<std::string_view, 12> kPartNames = {"bridge",
                                                          "machine",
                                                          "guidance",
                                                          "shields",
@@ -31,7 +31,8 @@ constexpr std::array<std::string_view, 11> kPartNames = {"bridge",
                                                          "devices",
                                                          "alarms",
                                                          "events",
-                                                         "commands"};
+                                                         "commands",
+                                                         "trolley"};
 
 std::int64_t StaleMs(const SourceLimits& limits) {
   return static_cast<std::int64_t>(std::llround(limits.period_s * 2000.0));
@@ -336,6 +337,18 @@ void ConsoleBoard::Add(const dds::CommandReply& message, const Arrival&, const M
   if (IsOurs(message) && commands_.Add(message)) Touch(kCommands);
 }
 
+void ConsoleBoard::Add(const dds::TrolleyState& message, const Arrival& arrival, const Moment&) {
+  if (!IsOurs(message)) return;
+  trolley_ = {message, arrival};
+  Touch(kTrolley);
+}
+
+void ConsoleBoard::Add(const dds::SettlementPiece& message, const Arrival&, const Moment&) {
+  if (!IsOurs(message)) return;
+  settlement_ = message;
+  Touch(kTrolley);
+}
+
 void ConsoleBoard::Add(const dds::Alarm& alarm, const Moment& now) {
   const auto own = AlarmOf(alarm.kind);
   if (!own || !alarm.ChangesKind()) return;
@@ -539,10 +552,23 @@ Json ConsoleBoard::ViewOfPart(Part part) const {
       return list;
     case kCommands:
       return commands_.View();
+    case kTrolley:
+      return TrolleyView();
     case kParts:
       break;
   }
   return nullptr;
+}
+
+Json ConsoleBoard::TrolleyView() const {
+  Json view = {{"state", nullptr}, {"settlement", nullptr}};
+  if (trolley_) {
+    view["state"] =
+        ViewOf(trolley_->message,
+               TimingOf(trolley_->arrival, trolley_->message.published_at, kTrolleyStale_ms));
+  }
+  if (settlement_) view["settlement"] = ViewOf(*settlement_);
+  return view;
 }
 
 std::vector<Section> ConsoleBoard::Sections() {

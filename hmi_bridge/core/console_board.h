@@ -69,6 +69,8 @@ class ConsoleBoard {
   void Add(const dds::AlarmStatus& message, const Arrival& arrival, const Moment& now);
   void Add(const dds::Event& message, const Arrival& arrival, const Moment& now);
   void Add(const dds::CommandReply& message, const Arrival& arrival, const Moment& now);
+  void Add(const dds::TrolleyState& message, const Arrival& arrival, const Moment& now);
+  void Add(const dds::SettlementPiece& message, const Arrival& arrival, const Moment& now);
   void Add(const dds::Alarm& alarm, const Moment& now);
   void SetNetwork(bool is_running, const Moment& now);
 
@@ -104,6 +106,7 @@ class ConsoleBoard {
     kAlarms,
     kEvents,
     kCommands,
+    kTrolley,
     kParts
   };
   struct PartText {
@@ -126,6 +129,7 @@ class ConsoleBoard {
   Json CameraView() const;
   Json StationView() const;
   Json AlarmsView() const;
+  Json TrolleyView() const;
   void WatchSilence(const Moment& now);
   void WatchCalibrations(const Moment& now);
 
@@ -146,6 +150,8 @@ class ConsoleBoard {
   std::map<std::string, Heard<dds::DeviceHealth>> devices_;
   std::map<std::string, ToldAlarm> alarms_;
   std::deque<dds::Event> events_;  // newest first
+  std::optional<Heard<dds::TrolleyState>> trolley_;
+  std::optional<dds::SettlementPiece> settlement_;  // the newest piece: all tell the whole's alert
   OwnAlarms own_alarms_;
   CommandLog commands_;
   History history_;

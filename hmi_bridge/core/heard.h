@@ -8,6 +8,7 @@ namespace tbm::hmi {
 
 // When a value is stale: two periods of its source (idl/README.md, "Topics").
 inline constexpr std::int64_t kGuidanceStale_ms = 400;
+inline constexpr std::int64_t kTrolleyStale_ms = 400;  // four: told beside other work
 inline constexpr std::int64_t kHeartbeatStale_ms = 2000;
 
 // One moment by both clocks of the bridge.

@@ -233,6 +233,30 @@ Json ViewOf(const dds::StationSetUp& set_up, Json timing) {
           {"references", EachOf(set_up.references)}};
 }
 
+Json ViewOf(const dds::TrolleyState& state, Json timing) {
+  const double speed_m_per_s = state.velocity_world_m_per_s.norm();
+  return {{"timing", std::move(timing)},
+          {"run", Text(state.run_id)},
+          {"status", Text(WordOf(state.status))},
+          {"reason", Text(state.reason)},
+          {"position_world_m", Place(state.position_world_m)},
+          {"position_sigma_mm", Triple(state.sigma_position_m, kMm, kMmDigits)},
+          {"speed_m_per_s", Metres(speed_m_per_s)},
+          {"distance_m", Metres(state.distance_m)},
+          {"target_age_s", Rounded(state.target_age_s, kMmDigits)},
+          {"tilt_age_s", Rounded(state.tilt_age_s, kMmDigits)},
+          {"rest_age_s", Rounded(state.rest_age_s, kMmDigits)},
+          {"came_too_late", state.came_too_late},
+          {"gaps", state.gaps}};
+}
+
+Json ViewOf(const dds::SettlementPiece& piece) {
+  return {{"base_run", Text(piece.base_run_id)},
+          {"later_run", Text(piece.later_run_id)},
+          {"at_utc_ms", Milliseconds(piece.published_at)},
+          {"highest_alert", piece.highest_alert}};
+}
+
 Json ViewOf(const dds::StationObservation& observation) {
   return {{"target", Text(observation.target)},
           {"kind", observation.kind == dds::ObservedKind::kPrism ? "prism" : "reference"},

@@ -9,6 +9,7 @@
 #include "hmi_bridge/core/heard.h"
 #include "idl/cpp/guidance_messages.h"
 #include "idl/cpp/messages.h"
+#include "idl/cpp/rail_messages.h"
 #include "pose/rig/rig.h"
 
 // The one place where messages become what a console shows: millimetres, degrees, words, rounded,
@@ -30,6 +31,9 @@ Json ViewOf(const dds::StationSetUp& set_up, Json timing);
 Json ViewOf(const dds::StationObservation& observation);
 Json ViewOf(const dds::DeviceHealth& health, Json timing);
 Json ViewOf(const dds::Event& event);
+Json ViewOf(const dds::TrolleyState& state, Json timing);
+// Of the whole comparison that the piece is of.
+Json ViewOf(const dds::SettlementPiece& piece);
 Json ViewOf(const dds::RelativePose& pose, const Rig& rig, Json timing);
 // Residuals are measured minus projected from `pose` [px], where that is of the same frame; null
 // without it.

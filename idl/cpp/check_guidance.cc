@@ -1,78 +1,11 @@
 #include <cmath>
-#include <initializer_list>
 
+#include "idl/cpp/check_numbers.h"
 #include "idl/cpp/convert.h"
 
 // The rules of the contract for the topics from the total station to the operator.
 namespace tbm::dds {
 namespace {
-
-constexpr double kUnitTolerance = 1e-6;  // of a quaternion's length: far above rounding
-constexpr std::int64_t kNeverNs = kNever.ns;
-
-bool IsTime(std::int64_t ns) { return ns > 0; }
-bool IsTimeOrNever(std::int64_t ns) { return ns > 0 || ns == kNeverNs; }
-
-bool AllNaN(std::initializer_list<double> numbers) {
-  for (const double x : numbers) {
-    if (!std::isnan(x)) return false;
-  }
-  return true;
-}
-template <std::size_t N>
-bool AllNaN(const std::array<double, N>& numbers) {
-  for (const double x : numbers) {
-    if (!std::isnan(x)) return false;
-  }
-  return true;
-}
-bool AllFinite(std::initializer_list<double> numbers) {
-  for (const double x : numbers) {
-    if (!std::isfinite(x)) return false;
-  }
-  return true;
-}
-template <std::size_t N>
-bool AllFinite(const std::array<double, N>& numbers) {
-  for (const double x : numbers) {
-    if (!std::isfinite(x)) return false;
-  }
-  return true;
-}
-bool NoneInfinite(std::initializer_list<double> numbers) {
-  for (const double x : numbers) {
-    if (std::isinf(x)) return false;
-  }
-  return true;
-}
-// Spreads, shares, ages: not known, or zero and more.
-bool NoneNegative(std::initializer_list<double> numbers) {
-  for (const double x : numbers) {
-    if (!(std::isnan(x) || (std::isfinite(x) && x >= 0.0))) return false;
-  }
-  return true;
-}
-
-// Square, finite, no negative variance, equal to its transpose but for rounding.
-template <std::size_t N>
-BoundaryFault CheckCovariance(const std::array<double, N>& covariance, std::size_t size) {
-  if (!AllFinite(covariance)) return BoundaryFault::kNotFinite;
-  for (std::size_t row = 0; row < size; ++row) {
-    if (covariance[row * (size + 1)] < 0.0) return BoundaryFault::kOutOfRange;
-    for (std::size_t column = 0; column < row; ++column) {
-      const double scale =
-          std::sqrt(covariance[row * (size + 1)] * covariance[column * (size + 1)]);
-      const double skew = covariance[row * size + column] - covariance[column * size + row];
-      if (std::abs(skew) > 1e-6 * scale) return BoundaryFault::kOutOfRange;
-    }
-  }
-  return BoundaryFault::kNone;
-}
-
-template <class... Words>
-bool AnyEmpty(const Words&... words) {
-  return ((words.size() == 0) || ...);
-}
 
 // Valid exactly when no reason is given.
 bool ReasonFits(v1::GuidanceValidity validity, std::size_t reason_length) {

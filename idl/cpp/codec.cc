@@ -63,6 +63,10 @@ TBM_CODEC_OF(Guidance);
 TBM_CODEC_OF(AlarmStatus);
 TBM_CODEC_OF(Command);
 TBM_CODEC_OF(CommandReply);
+TBM_CODEC_OF(TrolleyState);
+TBM_CODEC_OF(RailLinePiece);
+TBM_CODEC_OF(SettlementPiece);
+TBM_CODEC_OF(CalibrationStatus);
 #undef TBM_CODEC_OF
 
 }  // namespace tbm::dds

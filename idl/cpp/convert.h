@@ -1,19 +1,23 @@
 #pragma once
 
 #include "tbm_idl/alarm.h"
+#include "tbm_idl/calibration_status.h"
 #include "tbm_idl/command.h"
 #include "tbm_idl/device_health.h"
 #include "tbm_idl/event.h"
 #include "tbm_idl/frame_features.h"
 #include "tbm_idl/guidance.h"
 #include "tbm_idl/inclination.h"
+#include "tbm_idl/rail_line.h"
 #include "tbm_idl/relative_pose.h"
+#include "tbm_idl/settlement.h"
 #include "tbm_idl/station_observation.h"
 #include "tbm_idl/station_set_up.h"
 
 #include "idl/cpp/boundary.h"
 #include "idl/cpp/guidance_messages.h"
 #include "idl/cpp/messages.h"
+#include "idl/cpp/rail_messages.h"
 
 // The one translation between the words of the house (tbm::dds) and the generated types (tbm::v1).
 // Names in snake_case functions are generated ones. Only idl/cpp and its tests include this header.
@@ -33,6 +37,10 @@ void ToWire(const Guidance& message, v1::Guidance& wire);
 void ToWire(const AlarmStatus& message, v1::AlarmStatus& wire);
 void ToWire(const Command& message, v1::Command& wire);
 void ToWire(const CommandReply& message, v1::CommandReply& wire);
+void ToWire(const TrolleyState& message, v1::TrolleyState& wire);
+void ToWire(const RailLinePiece& message, v1::RailLinePiece& wire);
+void ToWire(const SettlementPiece& message, v1::SettlementPiece& wire);
+void ToWire(const CalibrationStatus& message, v1::CalibrationStatus& wire);
 
 // Every rule of the contract that a compiler cannot see. Asked before a sample goes out and before
 // one is let in, so a writer learns of its mistake first.
@@ -48,6 +56,10 @@ BoundaryFault Check(const v1::Guidance& wire);
 BoundaryFault Check(const v1::AlarmStatus& wire);
 BoundaryFault Check(const v1::Command& wire);
 BoundaryFault Check(const v1::CommandReply& wire);
+BoundaryFault Check(const v1::TrolleyState& wire);
+BoundaryFault Check(const v1::RailLinePiece& wire);
+BoundaryFault Check(const v1::SettlementPiece& wire);
+BoundaryFault Check(const v1::CalibrationStatus& wire);
 
 // Back again. Only for samples that passed Check.
 void FromWire(const v1::FrameFeatures& wire, FrameFeatures& message);
@@ -62,5 +74,9 @@ void FromWire(const v1::Guidance& wire, Guidance& message);
 void FromWire(const v1::AlarmStatus& wire, AlarmStatus& message);
 void FromWire(const v1::Command& wire, Command& message);
 void FromWire(const v1::CommandReply& wire, CommandReply& message);
+void FromWire(const v1::TrolleyState& wire, TrolleyState& message);
+void FromWire(const v1::RailLinePiece& wire, RailLinePiece& message);
+void FromWire(const v1::SettlementPiece& wire, SettlementPiece& message);
+void FromWire(const v1::CalibrationStatus& wire, CalibrationStatus& message);
 
 }  // namespace tbm::dds

@@ -167,5 +167,9 @@ template class Publisher<Guidance>;
 template class Publisher<AlarmStatus>;
 template class Publisher<Command>;
 template class Publisher<CommandReply>;
+template class Publisher<TrolleyState>;
+template class Publisher<RailLinePiece>;
+template class Publisher<SettlementPiece>;
+template class Publisher<CalibrationStatus>;
 
 }  // namespace tbm::dds

@@ -12,6 +12,7 @@ enum class QosClass {
   kEvents,       // things that must not be missed
   kRecord,       // single readings: each counts, and none is worth anything later
   kRequest,      // the same for what anybody may ask, and the answers
+  kResult,       // what a finished piece of work has come to
 };
 
 // What a class means. The same for writer and reader, so they always match.
@@ -57,6 +58,10 @@ constexpr QosRule RuleOf(QosClass qos_class) {
       return {false, 32, 16, std::chrono::milliseconds(0)};
     case QosClass::kRequest:
       return {false, 32, 16, std::chrono::milliseconds(0), false};
+    // A reader that starts later sees the last result whole: each of its pieces is a key. No
+    // deadline: one is enough, and the next may be a month away.
+    case QosClass::kResult:
+      return {true, 1, 256, std::chrono::milliseconds(0)};
   }
   return {};
 }

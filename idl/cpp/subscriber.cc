@@ -50,6 +50,16 @@ std::string NameOfKey(const Command& m) { return std::string(m.machine_id.view()
 std::string NameOfKey(const CommandReply& m) {
   return fmt::format("{}/{}", m.machine_id.view(), m.source.view());
 }
+std::string NameOfKey(const TrolleyState& m) { return std::string(m.machine_id.view()); }
+std::string NameOfKey(const RailLinePiece& m) {
+  return fmt::format("{}/{}", m.machine_id.view(), m.piece);
+}
+std::string NameOfKey(const SettlementPiece& m) {
+  return fmt::format("{}/{}", m.machine_id.view(), m.piece);
+}
+std::string NameOfKey(const CalibrationStatus& m) {
+  return fmt::format("{}/{}", m.machine_id.view(), m.subject.view());
+}
 
 KeyWatch::Id IdOf(const rtps::InstanceHandle_t& handle) {
   KeyWatch::Id id{};
@@ -327,5 +337,9 @@ template class Subscriber<Guidance>;
 template class Subscriber<AlarmStatus>;
 template class Subscriber<Command>;
 template class Subscriber<CommandReply>;
+template class Subscriber<TrolleyState>;
+template class Subscriber<RailLinePiece>;
+template class Subscriber<SettlementPiece>;
+template class Subscriber<CalibrationStatus>;
 
 }  // namespace tbm::dds

@@ -6,6 +6,7 @@
 #include "idl/cpp/guidance_messages.h"
 #include "idl/cpp/messages.h"
 #include "idl/cpp/qos.h"
+#include "idl/cpp/rail_messages.h"
 
 namespace tbm::dds {
 
@@ -38,6 +39,14 @@ inline constexpr TopicRow kAlarmStatusTopic{
 inline constexpr TopicRow kCommandTopic{"tbm/v1/command", "tbm::v1::Command", QosClass::kRequest};
 inline constexpr TopicRow kCommandReplyTopic{
     "tbm/v1/command_reply", "tbm::v1::CommandReply", QosClass::kRequest};
+inline constexpr TopicRow kTrolleyStateTopic{
+    "tbm/v1/trolley_state", "tbm::v1::TrolleyState", QosClass::kMeasurement};
+inline constexpr TopicRow kRailLineTopic{
+    "tbm/v1/rail_line", "tbm::v1::RailLinePiece", QosClass::kResult};
+inline constexpr TopicRow kSettlementTopic{
+    "tbm/v1/settlement", "tbm::v1::SettlementPiece", QosClass::kResult};
+inline constexpr TopicRow kCalibrationStatusTopic{
+    "tbm/v1/calibration_status", "tbm::v1::CalibrationStatus", QosClass::kHealth};
 
 inline constexpr std::array kTopics{kFrameFeaturesTopic,
                                     kInclinationTopic,
@@ -50,7 +59,11 @@ inline constexpr std::array kTopics{kFrameFeaturesTopic,
                                     kGuidanceTopic,
                                     kAlarmStatusTopic,
                                     kCommandTopic,
-                                    kCommandReplyTopic};
+                                    kCommandReplyTopic,
+                                    kTrolleyStateTopic,
+                                    kRailLineTopic,
+                                    kSettlementTopic,
+                                    kCalibrationStatusTopic};
 
 // The topic that carries a message type.
 template <class Message>
@@ -102,6 +115,22 @@ constexpr TopicRow TopicOf<Command>() {
 template <>
 constexpr TopicRow TopicOf<CommandReply>() {
   return kCommandReplyTopic;
+}
+template <>
+constexpr TopicRow TopicOf<TrolleyState>() {
+  return kTrolleyStateTopic;
+}
+template <>
+constexpr TopicRow TopicOf<RailLinePiece>() {
+  return kRailLineTopic;
+}
+template <>
+constexpr TopicRow TopicOf<SettlementPiece>() {
+  return kSettlementTopic;
+}
+template <>
+constexpr TopicRow TopicOf<CalibrationStatus>() {
+  return kCalibrationStatusTopic;
 }
 
 }  // namespace tbm::dds

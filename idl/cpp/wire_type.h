@@ -65,6 +65,22 @@ template <>
 struct WireOf<CommandReply> {
   using Type = v1::CommandReply;
 };
+template <>
+struct WireOf<TrolleyState> {
+  using Type = v1::TrolleyState;
+};
+template <>
+struct WireOf<RailLinePiece> {
+  using Type = v1::RailLinePiece;
+};
+template <>
+struct WireOf<SettlementPiece> {
+  using Type = v1::SettlementPiece;
+};
+template <>
+struct WireOf<CalibrationStatus> {
+  using Type = v1::CalibrationStatus;
+};
 
 // A sample as it came: `value` means something only when the bytes were exactly one value of the
 // type.

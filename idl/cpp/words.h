@@ -4,6 +4,7 @@
 
 #include "idl/cpp/guidance_messages.h"
 #include "idl/cpp/messages.h"
+#include "idl/cpp/rail_messages.h"
 
 // Enumerators of the contract as the words that stand on screens, in tables and in JSON.
 namespace tbm::dds {
@@ -94,6 +95,36 @@ constexpr std::string_view WordOf(CommandOutcome outcome) {
       return "refused";
     case CommandOutcome::kFailed:
       return "failed";
+  }
+  return "";
+}
+
+constexpr std::string_view WordOf(RailPointStatus status) {
+  switch (status) {
+    case RailPointStatus::kNone:
+      return "none";
+    case RailPointStatus::kGap:
+      return "gap";
+    case RailPointStatus::kOpen:
+      return "open";
+    case RailPointStatus::kBridged:
+      return "bridged";
+    case RailPointStatus::kFixed:
+      return "fixed";
+  }
+  return "";
+}
+
+constexpr std::string_view WordOf(CalibrationState state) {
+  switch (state) {
+    case CalibrationState::kNone:
+      return "none";
+    case CalibrationState::kUndated:
+      return "undated";
+    case CalibrationState::kDue:
+      return "due";
+    case CalibrationState::kValid:
+      return "valid";
   }
   return "";
 }

@@ -8,7 +8,7 @@ import package_world as world
 
 BESIDE_LIBRARIES = {"tbm-camera-box": {"systemd", "passwd", "init-system-helpers"}, "tbm-tools": set()}
 HELD = {"tbm-camera-box": ["/usr/bin/camera_box"],
-        "tbm-tools": ["/usr/bin/guidance", "/usr/bin/total_station", "/usr/bin/hmi_bridge", "/usr/bin/tbm", "/usr/bin/tbm_sim", "/usr/bin/camera_sim", "/usr/bin/total_station_sim",
+        "tbm-tools": ["/usr/bin/guidance", "/usr/bin/rail_line", "/usr/bin/total_station", "/usr/bin/hmi_bridge", "/usr/bin/tbm", "/usr/bin/tbm_sim", "/usr/bin/camera_sim", "/usr/bin/total_station_sim",
                       "/usr/share/bash-completion/completions/tbm", "/usr/share/zsh/vendor-completions/_tbm"]}
 
 

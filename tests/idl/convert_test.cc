@@ -10,6 +10,7 @@
 #include "idl/cpp/topics.h"
 #include "idl/cpp/wire_type.h"
 #include "tests/idl/guidance_samples.h"
+#include "tests/idl/rail_samples.h"
 #include "tests/idl/samples.h"
 #include "tests/support/random.h"
 
@@ -311,6 +312,74 @@ TEST(Boundary, RefusesAlarmsAndCommandsThatBreakTheContract) {
   EXPECT_EQ(r([](R& x) { x.published_at_utc_ns(0); }), BoundaryFault::kNoTime);
 }
 
+TEST(Boundary, RefusesTheRailLineWhereItBreaksTheContract) {
+  using T = v1::TrolleyState;
+  using L = v1::RailLinePiece;
+  using S = v1::SettlementPiece;
+  using C = v1::CalibrationStatus;
+  const auto t = [](const std::function<void(T&)>& s) { return After(FullTrolleyState(), s); };
+  const auto l = [](const std::function<void(L&)>& s) { return After(FullRailLinePiece(), s); };
+  const auto s = [](const std::function<void(S&)>& f) { return After(FullSettlementPiece(), f); };
+  const auto c = [](const std::function<void(C&)>& f) { return After(FullCalibrationStatus(), f); };
+  EXPECT_EQ(t([](T& x) { x.valid_at_utc_ns(0); }), BoundaryFault::kNoTime);
+  EXPECT_EQ(t([](T& x) { x.status(static_cast<v1::RailPointStatus>(5)); }),
+            BoundaryFault::kEnumRange);
+  EXPECT_EQ(t([](T& x) { x.status(v1::RAIL_BRIDGED); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(t([](T& x) { x.reason("imu_silent"); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(t([](T& x) { x.run_id(""); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(t([](T& x) { x.position_world_m()[1] = kNaN; }), BoundaryFault::kNotFinite);
+  EXPECT_EQ(t([](T& x) { x.world_from_imu_qw(0.6); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(t([](T& x) { x.sigma_attitude_rad()[2] = -1.0; }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(t([](T& x) { x.tilt_age_s(-0.1); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(t([](T& x) { x.tilt_age_s(kNaN); }), BoundaryFault::kNone);  // never
+  const auto none = [](T& x) {
+    x.status(v1::RAIL_NONE);
+    x.reason("imu_silent");
+  };
+  EXPECT_EQ(t(none), BoundaryFault::kContradiction);  // with numbers
+  EXPECT_EQ(l([](L& x) { x.begins_at_utc_ns(-1); }), BoundaryFault::kNoTime);
+  EXPECT_EQ(l([](L& x) { x.piece(0); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(l([](L& x) { x.piece(8); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(l([](L& x) { x.piece(7); }), BoundaryFault::kContradiction);  // the last, and not full
+  EXPECT_EQ(l([](L& x) { x.points_before(0); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(l([](L& x) { x.points().clear(); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(l([](L& x) { x.points().resize(129); }), BoundaryFault::kTooLong);
+  EXPECT_EQ(l([](L& x) { x.pieces(257); }), BoundaryFault::kTooLong);
+  EXPECT_EQ(l([](L& x) { x.line_sha256(""); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(l([](L& x) { x.points()[1].distance_m(1.0); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(l([](L& x) { x.points()[1].status(v1::RAIL_NONE); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(l([](L& x) { x.points()[0].sigma_world_m()[0] = kNaN; }), BoundaryFault::kNotFinite);
+  EXPECT_EQ(s([](S& x) { x.base_run_id(""); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(s([](S& x) { x.level(1.0); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(s([](S& x) { x.highest_alert(2); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(s([](S& x) { x.points()[0].dz_m(kNaN); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(s([](S& x) { x.points()[1].alert(1); }), BoundaryFault::kContradiction);
+  const auto not_compared = [](S& x) {
+    x.points()[1].dz_m(kNaN);
+    x.points()[1].sigma_m(kNaN);
+  };
+  EXPECT_EQ(s(not_compared), BoundaryFault::kNone);
+  EXPECT_EQ(c([](C& x) { x.subject(""); }), BoundaryFault::kNoKey);
+  EXPECT_EQ(c([](C& x) { x.calibrated_at_utc_ns(0); }), BoundaryFault::kNoTime);
+  EXPECT_EQ(c([](C& x) { x.calibrated_at_utc_ns(-1); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(c([](C& x) { x.state(v1::CALIBRATION_VALID); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(c([](C& x) { x.state(v1::CALIBRATION_NONE); }), BoundaryFault::kContradiction);
+  EXPECT_EQ(c([](C& x) { x.sigmas()[0].sigma(kNaN); }), BoundaryFault::kOutOfRange);
+  EXPECT_EQ(c([](C& x) { x.sigmas().resize(9); }), BoundaryFault::kTooLong);
+}
+
+TEST(Conversion, ATrolleyWithoutAPlaceKeepsItsAgesAndNoNumbers) {
+  TrolleyState state = FullTrolleyState();
+  state.status = RailPointStatus::kNone;
+  state.reason = "imu_silent";
+  const TrolleyState back = BackAgain(state);
+  EXPECT_TRUE(std::isnan(back.position_world_m.x()));
+  EXPECT_TRUE(std::isnan(back.world_from_imu.w()));
+  EXPECT_EQ(back.target_age_s, state.target_age_s);
+  EXPECT_EQ(back.came_too_late, state.came_too_late);
+  EXPECT_EQ(back.reason, state.reason);
+}
+
 template <class Message>
 std::vector<char> Encoded(const Message& message) {
   WireSample<Wire<Message>> sample;
@@ -337,6 +406,10 @@ struct Fulls {
   static AlarmStatus Of(const AlarmStatus*) { return FullAlarmStatus(); }
   static Command Of(const Command*) { return FullCommand(); }
   static CommandReply Of(const CommandReply*) { return FullCommandReply(); }
+  static TrolleyState Of(const TrolleyState*) { return FullTrolleyState(); }
+  static RailLinePiece Of(const RailLinePiece*) { return FullRailLinePiece(); }
+  static SettlementPiece Of(const SettlementPiece*) { return FullSettlementPiece(); }
+  static CalibrationStatus Of(const CalibrationStatus*) { return FullCalibrationStatus(); }
 };
 using Messages = testing::Types<FrameFeatures,
                                 TiltReading,
@@ -349,7 +422,11 @@ using Messages = testing::Types<FrameFeatures,
                                 Guidance,
                                 AlarmStatus,
                                 Command,
-                                CommandReply>;
+                                CommandReply,
+                                TrolleyState,
+                                RailLinePiece,
+                                SettlementPiece,
+                                CalibrationStatus>;
 TYPED_TEST_SUITE(Bytes, Messages);
 
 TYPED_TEST(Bytes, CutAtEveryLengthAreRefused) {

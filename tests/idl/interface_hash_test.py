@@ -25,7 +25,7 @@ def changed(old, new):
     return digest(spoilt)
 
 
-expect(len(texts) == 10, "ten files")
+expect(len(texts) == 13, "thirteen files")
 expect(digest(reversed(texts)) == base, "the order of the files does not count")
 expect(digest([text.replace("\n", "\r\n") for text in texts]) == base, "line ends do not count")
 expect(changed("// [rad]", "// [deg]") == base, "comments do not count")

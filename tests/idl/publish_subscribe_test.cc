@@ -8,6 +8,7 @@
 #include "idl/cpp/subscriber.h"
 #include "tests/idl/dds_support.h"
 #include "tests/idl/guidance_samples.h"
+#include "tests/idl/rail_samples.h"
 #include "tests/idl/raw_endpoints.h"
 #include "tests/idl/samples.h"
 
@@ -48,6 +49,12 @@ TEST(OverTheWire, EveryFieldOfTheTopicsOfGuidanceArrives) {
   ExpectToArriveWhole(FullAlarmStatus());
   ExpectToArriveWhole(FullCommand());
   ExpectToArriveWhole(FullCommandReply());
+}
+TEST(OverTheWire, EveryFieldOfTheTopicsOfTheRailLineArrives) {
+  ExpectToArriveWhole(FullTrolleyState());
+  ExpectToArriveWhole(FullRailLinePiece());
+  ExpectToArriveWhole(FullSettlementPiece());
+  ExpectToArriveWhole(FullCalibrationStatus());
 }
 
 TEST(OverTheWire, APoseThatIsMissingArrivesAsNaNWithItsReason) {

@@ -1,4 +1,4 @@
-"""Fails when convert_guidance.cc ties a field to another one's name, or leaves a field of the IDL out.
+"""Fails when convert_guidance.cc or convert_rail.cc ties a field to another one's name, or leaves a field of the IDL out.
 
 A field that goes to the wrong place and comes back from there is seen by no test that sends it there and
 back.
@@ -9,6 +9,7 @@ import sys
 
 ELSEWHERE = {("ShieldPose", name) for name in
              ("site_from_shield_qw", "site_from_shield_qx", "site_from_shield_qy", "site_from_shield_qz")}
+ELSEWHERE |= {("TrolleyState", f"world_from_imu_q{axis}") for axis in "wxyz"}
 
 
 def faults(code, idl_texts):
@@ -36,9 +37,10 @@ def faults(code, idl_texts):
 
 
 root = pathlib.Path(sys.argv[1])
-code = (root / "idl/cpp/convert_guidance.cc").read_text()
+code = "".join((root / f"idl/cpp/convert_{of}.cc").read_text() for of in ("guidance", "rail"))
 texts = [(root / f"idl/{name}.idl").read_text()
-         for name in ("station_observation", "station_set_up", "guidance", "alarm", "command")]
+         for name in ("station_observation", "station_set_up", "guidance", "alarm", "command",
+                      "rail_line", "settlement", "calibration_status")]
 for spoilt, why in ((code.replace("w.slope_m()", "w.across_m()"), "swapped"),
                     (code.replace("  way(m.axis_name, w.axis_name());\n", ""), "left out")):
     assert any(True for _ in faults(spoilt, texts)), f"a field that is {why} is not noticed"

@@ -1,12 +1,12 @@
 # Debian packages, made by tools/package/build:
 #   tbm-camera-box   what runs on the box: the program, its unit, its configuration (any architecture)
-#   tbm-tools        the PC's side: guidance, total_station, hmi_bridge with its page, tbm, the simulators
+#   tbm-tools        the PC's side: guidance, rail_line, total_station, hmi_bridge with its page, tbm, the simulators
 # Included at the end of the root CMakeLists.txt.
 
 set(package_dir ${CMAKE_CURRENT_LIST_DIR})
 
 # Only what is used becomes a dependency.
-foreach(program camera_box guidance total_station hmi_bridge tbm tbm_sim camera_sim total_station_sim)
+foreach(program camera_box guidance rail_line total_station hmi_bridge tbm tbm_sim camera_sim total_station_sim)
   if(TARGET ${program})
     target_link_options(${program} PRIVATE -Wl,--as-needed)
   endif()
@@ -34,7 +34,7 @@ install(FILES ${package_dir}/box/serial.rules
 set(package_components camera_box)
 if(NOT CMAKE_CROSSCOMPILING)
   list(APPEND package_components tools)
-  install(TARGETS guidance total_station hmi_bridge tbm tbm_sim camera_sim total_station_sim
+  install(TARGETS guidance rail_line total_station hmi_bridge tbm tbm_sim camera_sim total_station_sim
     RUNTIME DESTINATION bin COMPONENT tools)
   install(DIRECTORY ${PROJECT_BINARY_DIR}/web/ DESTINATION share/tbm/console COMPONENT tools)
   install(FILES ${PROJECT_SOURCE_DIR}/README.md DESTINATION share/doc/tbm-tools COMPONENT tools)
@@ -106,6 +106,7 @@ set(tools_depends
   "libopencv-calib3d406 (>= 4.6.0+dfsg)"
   "libopencv-core406 (>= 4.6.0+dfsg)"
   "libopencv-features2d406 (>= 4.6.0+dfsg)"
+  "libopencv-flann406 (>= 4.6.0+dfsg)"
   "libopencv-imgproc406 (>= 4.6.0+dfsg)"
   "libpng16-16 (>= 1.6.39)"
   "libpugixml1v5 (>= 1.13)"
@@ -139,7 +140,8 @@ set(CPACK_DEBIAN_TOOLS_PACKAGE_SUGGESTS "gnuplot-nox")
 set(CPACK_COMPONENT_TOOLS_DESCRIPTION
 "guidance of a tunnel boring machine, and the surveyor's tools
 guidance and total_station say on DDS where both shields are against the
-design axis, and keep a journal; hmi_bridge is the operator's console for
+design axis, and keep a journal; rail_line follows a trolley on its rails and
+makes the line of them; hmi_bridge is the operator's console for
 browsers; tbm solves recorded runs, checks against a
 total station, shows the live system and works on journals; the simulators
 stand in for camera, inclinometers and total station.")

@@ -159,6 +159,44 @@ EXPECTED = {
         "outcome": "COMMAND_FAILED", "text": "only one reference was seen; the set-up stays suspect",
         "published_at_utc_ns": T + 702,
     },
+    "trolley_state": {
+        "machine_id": "machine-19", "valid_at_utc_ns": T + 801, "published_at_utc_ns": T + 802,
+        "sample_number": 803_000_000_000, "run_id": "run-19", "status": "RAIL_OPEN", "reason": "",
+        "position_world_m": [804.1, -805.2, 806.3], "sigma_position_m": [0.0081, 0.0082, 0.0083],
+        "velocity_world_m_per_s": [0.84, -0.085, 0.0086], "sigma_velocity_m_per_s": [0.00087, 0.00088, 0.00089],
+        "world_from_imu_qw": 0.5, "world_from_imu_qx": 0.1, "world_from_imu_qy": -0.7, "world_from_imu_qz": 0.5,
+        "sigma_attitude_rad": [0.00081, 0.00082, 0.00083],
+        "gyro_bias_rad_per_s": [1.1e-5, -1.2e-5, 1.3e-5], "sigma_gyro_bias_rad_per_s": [1.4e-6, 1.5e-6, 1.6e-6],
+        "accel_bias_m_per_s2": [1.7e-3, -1.8e-3, 1.9e-3], "sigma_accel_bias_m_per_s2": [2.1e-4, 2.2e-4, 2.3e-4],
+        "distance_m": 80.7, "target_age_s": 8.08, "tilt_age_s": 0.089, "rest_age_s": 81.1,
+        "came_too_late": 812, "gaps": 813,
+    },
+    "rail_line": {
+        "machine_id": "machine-20", "piece": 3, "published_at_utc_ns": T + 901, "run_id": "run-20",
+        "line_sha256": "c123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef",
+        "method": "smoothed", "begins_at_utc_ns": T + 902, "ends_at_utc_ns": T + 903,
+        "pieces": 7, "points_in_all": 900, "points_before": 256,
+        "points": [{"distance_m": 90.5 + i, "position_world_m": [906.1 + i, 907.2 + i, 908.3 + i],
+                    "sigma_world_m": [0.00091 + i, 0.00092 + i, 0.00093 + i],
+                    "status": ["RAIL_BRIDGED", "RAIL_GAP"][i]} for i in range(2)],
+    },
+    "settlement": {
+        "machine_id": "machine-21", "piece": 2, "published_at_utc_ns": T + 1001,
+        "base_run_id": "run-21", "later_run_id": "run-22",
+        "base_sha256": "d123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef",
+        "later_sha256": "e123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef",
+        "level": 0.95, "highest_alert": 4, "pieces": 5, "points_in_all": 600, "points_before": 128,
+        "points": [{"distance_m": 10.6 + i, "dz_m": -0.0107 + 0.01 * i, "sigma_m": 0.00108 + i,
+                    "is_significant": i == 0, "alert": 3 if i == 0 else 0} for i in range(2)],
+    },
+    "calibration_status": {
+        "machine_id": "machine-23", "subject": "imu_mounting", "source": "rail_line",
+        "published_at_utc_ns": T + 1101, "state": "CALIBRATION_DUE", "reason": "overdue",
+        "calibrated_at_utc_ns": 1_690_000_000_000_001_102, "age_days": 115.7, "due_after_days": 90.0,
+        "file_sha256": "f123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef",
+        "sigmas": [{"what": ["camera_rotation", "camera_position"][i], "sigma": 0.0111 + i,
+                    "unit": ["rad", "m"][i]} for i in range(2)],
+    },
 }
 
 # When a sample was sent, where it is not published_at_utc_ns that says so.
@@ -236,11 +274,20 @@ ARRAYS["shield_pose", "covariance"] = upper_triangle(
     "covariance", [*(f"turn_{a}_rad" for a in ENU), *(f"{a}_m" for a in ENU)])
 ARRAYS["relative_pose", "covariance"] = upper_triangle(
     "covariance", [*(f"turn_{a}_rad" for a in "xyz"), *(f"{a}_m" for a in "xyz")])
+for t in ["trolley_state", "rail_line"]:
+    ARRAYS[t, "position_world_m"] = [f"{a}_world_m" for a in "xyz"]
+    ARRAYS[t, "sigma_position_m"] = ARRAYS[t, "sigma_world_m"] = [f"sigma_{a}_m" for a in "xyz"]
+for what, unit in [("velocity", "m_per_s"), ("attitude", "rad"), ("gyro_bias", "rad_per_s"),
+                   ("accel_bias", "m_per_s2")]:
+    ARRAYS["trolley_state", f"{what}_{unit}"] = [f"{what}_{a}_{unit}" for a in "xyz"]
+    ARRAYS["trolley_state", f"sigma_{what}_{unit}"] = [f"sigma_{what}_{a}_{unit}" for a in "xyz"]
+ARRAYS["trolley_state", "velocity_world_m_per_s"] = ARRAYS["trolley_state", "velocity_m_per_s"]
 # What stands before the names of the fields of an item: its own name, or its place.
 BEFORE = {"spots": "spot_{place}_", "points": "{name}_", "references": "reference_{name}_",
-          "sources": "source_{name}_", "ahead": "ahead_{place}_"}
+          "sources": "source_{name}_", "ahead": "ahead_{place}_", "sigmas": "{what}_"}
+BY_PLACE = {"rail_line", "settlement"}  # whose points have no names
 PREFIXES = re.compile("^(TILT|POSE_STATUS|DEVICE|EVENT|OBSERVED|OBSERVATION_FACE|OBSERVATION|SET_UP|GUIDANCE|"
-                      "SOURCE|ALARM|COMMAND)_")
+                      "SOURCE|ALARM|COMMAND|RAIL|CALIBRATION)_")
 
 
 def cells(topic, message, idl):
@@ -251,8 +298,9 @@ def cells(topic, message, idl):
             continue  # its word stands in reason_code
         if name in BEFORE:
             for place, item in enumerate(value, 1):
-                before = BEFORE[name].format(place=place, name=item.get("name"))
-                inner = {field: v for field, v in item.items() if field != "name"}
+                form = "point_{place}_" if topic in BY_PLACE else BEFORE[name]
+                before = form.format(place=place, name=item.get("name"), what=item.get("what"))
+                inner = {field: v for field, v in item.items() if field not in ("name", "what")}
                 row.update({before + field: v for field, v in cells(topic, inner, idl).items()})
         elif isinstance(value, list):
             columns = ARRAYS[topic, name]

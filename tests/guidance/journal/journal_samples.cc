@@ -13,6 +13,7 @@
 #include "guidance/journal/mcap_repair.h"
 #include "guidance/journal/mcap_writer.h"
 #include "tests/idl/guidance_samples.h"
+#include "tests/idl/rail_samples.h"
 #include "tests/idl/samples.h"
 #include "tests/support/temp_folder.h"
 
@@ -56,7 +57,11 @@ int WriteFull(const std::string& folder) {
                                  FullGuidance(),
                                  FullAlarmStatus(),
                                  FullCommand(),
-                                 FullCommandReply());
+                                 FullCommandReply(),
+                                 FullTrolleyState(),
+                                 FullRailLinePiece(),
+                                 FullSettlementPiece(),
+                                 FullCalibrationStatus());
   const auto local = journal.AddChannel({"local/note", "text", {}});
   constexpr std::string_view kNote = "not of DDS";
   journal.Add(local, std::as_bytes(std::span(kNote)), kLogTime + Duration(100), kLogTime);

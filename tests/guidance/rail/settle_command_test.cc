@@ -14,14 +14,18 @@
 #include <gtest/gtest.h>
 
 #include "guidance/app/geometry_command.h"
+#include "tests/support/command.h"
 #include "tests/support/random.h"
 #include "tests/support/temp_folder.h"
 
 namespace tbm {
 namespace {
 
+using test::Outcome;
+using test::Ran;
 using test::Random;
 using test::ReadText;
+using test::Rows;
 using test::TempFolder;
 using test::WriteText;
 using ::testing::HasSubstr;
@@ -56,32 +60,6 @@ std::string Text(const Line& line) {
 }
 
 double Trough(double m) { return -0.003 * std::exp(-0.5 * std::pow((m - 20.0) / 3.0, 2)); }
-
-struct Outcome {
-  ExitCode code;
-  std::string out;
-  std::string err;
-};
-
-template <class Request>
-Outcome Ran(ExitCode (*command)(const Request&, const Console&), const Request& request) {
-  std::ostringstream out;
-  std::ostringstream err;
-  const ExitCode code = command(request, {out, err});
-  return {code, out.str(), err.str()};
-}
-
-std::vector<std::vector<std::string>> Rows(const std::string& csv) {
-  std::vector<std::vector<std::string>> rows;
-  std::istringstream lines(csv);
-  for (std::string line; std::getline(lines, line);) {
-    std::vector<std::string> fields;
-    std::istringstream stream(line + ",");
-    for (std::string field; std::getline(stream, field, ',');) fields.push_back(field);
-    rows.push_back(fields);
-  }
-  return rows;
-}
 
 class SettleCommand : public ::testing::Test {
  protected:

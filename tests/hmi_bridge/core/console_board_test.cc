@@ -10,6 +10,7 @@
 
 #include "tests/hmi_bridge/core/console_fixture.h"
 #include "tests/idl/guidance_samples.h"
+#include "tests/idl/rail_samples.h"
 #include "tests/idl/samples.h"
 
 namespace tbm::hmi {
@@ -52,6 +53,19 @@ TEST(ViewJson, WhatIsNotKnownIsNull) {
   const Json set_up = ViewOf(dds::StationSetUp(), nullptr);
   EXPECT_TRUE(set_up["position_in_site_m"].is_null());
   EXPECT_TRUE(set_up["set_up_at_utc_ms"].is_null());
+}
+
+TEST(ViewJson, ATrolleyWithoutAPlaceHasNoNumbers) {
+  dds::TrolleyState state = dds::test::FullTrolleyState();
+  const Json known = ViewOf(state, nullptr);
+  EXPECT_EQ(known["position_world_m"], Json({804.1, -805.2, 806.3}));
+  EXPECT_EQ(known["position_sigma_mm"], Json({8.1, 8.2, 8.3}));
+  EXPECT_EQ(known["status"], "open");
+  const Json none = ViewOf(dds::TrolleyState(), nullptr);
+  EXPECT_TRUE(none["position_world_m"].is_null() && none["speed_m_per_s"].is_null());
+  EXPECT_TRUE(none["target_age_s"].is_null());
+  EXPECT_EQ(none["status"], "none");
+  EXPECT_EQ(ViewOf(dds::test::FullSettlementPiece())["highest_alert"], 4);
 }
 
 TEST(ViewJson, RoundsAndKnowsNoMinusZero) {
