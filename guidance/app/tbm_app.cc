@@ -82,7 +82,7 @@ constexpr const char* kCentresHelp =
     "Example\n"
     "  tbm centres run_0412 --out centres.csv";
 
-constexpr const char* kCheckHelp =
+constexpr const char* kCheckPosesHelp =
     "POSES is a file of tbm solve. LOG holds what the total station measured of the same point: a "
     "CSV with\n"
     "the columns stamp_ns, point, x_mm, y_mm, z_mm, or a Leica GSI-8 / GSI-16 file (east, north, "
@@ -232,7 +232,7 @@ CLI::App* AddCentres(CLI::App& app, Requests& requests) {
 CLI::App* AddCheck(CLI::App& app, Requests& requests) {
   CheckRequest& request = requests.check;
   CLI::App* check = app.add_subcommand("check", "Poses against a total station");
-  check->footer(kCheckHelp);
+  check->footer(kCheckPosesHelp);
   check->add_option("POSES", request.poses, "file of tbm solve, or a record of guidance")
       ->required();
   check->add_option("LOG", request.log, "total station's file: CSV or Leica GSI")->required();

@@ -32,14 +32,6 @@ struct Candidate {
   double sigma_px = 0.0;
 };
 
-// All on which a prediction rests.
-struct Exposure {
-  const FusionLayout& layout;
-  const CameraModel& camera;
-  Eigen::Vector3d rate_rad_s;
-  bool is_moving = false;
-};
-
 // Rows of all candidates divided by their sigma: many rows, of which the QR leaves as many as there
 // are columns.
 struct Stacked {
@@ -100,13 +92,52 @@ double PixelSigma(const PixelPrediction& prediction, double residual_px, double 
   return std::hypot(residual_px, by_target);
 }
 
-Exposure ExposureOf(const FusionFilter& filter, const CameraModel& camera) {
+PixelExposure ExposureOf(const FusionFilter& filter, const CameraModel& camera) {
   return {filter.layout(), camera, filter.rate_rad_s(), IsMoving(filter)};
 }
 
-Result<PixelPrediction, CameraModelFailure> Predict(const Exposure& exposure,
-                                                    const FusionState& state,
-                                                    const SurveyedTarget& target) {
+// What all candidates together say of the error of the filter's state.
+FusionVector Told(const FusionFilter& filter, const std::vector<Candidate>& candidates) {
+  const Compressed all = Compress(Stack(candidates, filter.layout().size()));
+  const FusionMatrix& h = all.measurement.h;
+  const FusionMatrix cross = filter.covariance() * h.transpose();
+  const FusionMatrix spread = h * cross + all.measurement.noise;
+  return cross * spread.llt().solve(all.measurement.residual);
+}
+
+// Takes the derivatives where the image puts the state, not where the filter had it: after a long
+// way without targets the two are far from each other, and what is linear there is not so here.
+// Returns what the candidates then say.
+FusionVector LineariseWhereTold(const FusionFilter& filter,
+                                const PixelExposure& exposure,
+                                std::span<const SurveyedTarget> targets,
+                                std::vector<Candidate>* candidates) {
+  FusionVector e = Told(filter, *candidates);
+  for (int step = 0; step < kMostSteps; ++step) {
+    const FusionState there = MovedBy(filter.state(), filter.layout(), e);
+    std::vector<Candidate> moved = *candidates;
+    double bent = 0.0;
+    for (Candidate& one : moved) {
+      const auto prediction =
+          PredictPixel(exposure, there, targets[static_cast<std::size_t>(one.target)]);
+      if (!prediction) return e;
+      const Eigen::Vector2d off_px = one.pixel_px - prediction->pixel_px;
+      bent = std::max(bent, (off_px - (one.off_px - one.by_error * e)).norm() / one.sigma_px);
+      one.by_error = prediction->by_error;
+      one.off_px = off_px + one.by_error * e;
+    }
+    if (bent < kStraight) break;
+    *candidates = std::move(moved);
+    e = Told(filter, *candidates);
+  }
+  return e;
+}
+
+}  // namespace
+
+Result<PixelPrediction, CameraModelFailure> PredictPixel(const PixelExposure& exposure,
+                                                         const FusionState& state,
+                                                         const SurveyedTarget& target) {
   const FusionLayout& layout = exposure.layout;
   const Eigen::Vector3d& rate = exposure.rate_rad_s;
   const double late_s = state.time_offset_s;
@@ -153,49 +184,10 @@ Result<PixelPrediction, CameraModelFailure> Predict(const Exposure& exposure,
   return prediction;
 }
 
-// What all candidates together say of the error of the filter's state.
-FusionVector Told(const FusionFilter& filter, const std::vector<Candidate>& candidates) {
-  const Compressed all = Compress(Stack(candidates, filter.layout().size()));
-  const FusionMatrix& h = all.measurement.h;
-  const FusionMatrix cross = filter.covariance() * h.transpose();
-  const FusionMatrix spread = h * cross + all.measurement.noise;
-  return cross * spread.llt().solve(all.measurement.residual);
-}
-
-// Takes the derivatives where the image puts the state, not where the filter had it: after a long
-// way without targets the two are far from each other, and what is linear there is not so here.
-// Returns what the candidates then say.
-FusionVector LineariseWhereTold(const FusionFilter& filter,
-                                const Exposure& exposure,
-                                std::span<const SurveyedTarget> targets,
-                                std::vector<Candidate>* candidates) {
-  FusionVector e = Told(filter, *candidates);
-  for (int step = 0; step < kMostSteps; ++step) {
-    const FusionState there = MovedBy(filter.state(), filter.layout(), e);
-    std::vector<Candidate> moved = *candidates;
-    double bent = 0.0;
-    for (Candidate& one : moved) {
-      const auto prediction =
-          Predict(exposure, there, targets[static_cast<std::size_t>(one.target)]);
-      if (!prediction) return e;
-      const Eigen::Vector2d off_px = one.pixel_px - prediction->pixel_px;
-      bent = std::max(bent, (off_px - (one.off_px - one.by_error * e)).norm() / one.sigma_px);
-      one.by_error = prediction->by_error;
-      one.off_px = off_px + one.by_error * e;
-    }
-    if (bent < kStraight) break;
-    *candidates = std::move(moved);
-    e = Told(filter, *candidates);
-  }
-  return e;
-}
-
-}  // namespace
-
 Result<PixelPrediction, CameraModelFailure> PredictPixel(const FusionFilter& filter,
                                                          const CameraModel& camera,
                                                          const SurveyedTarget& target) {
-  return Predict(ExposureOf(filter, camera), filter.state(), target);
+  return PredictPixel(ExposureOf(filter, camera), filter.state(), target);
 }
 
 TargetsVerdict UpdateByTargets(FusionFilter& filter,
@@ -207,12 +199,12 @@ TargetsVerdict UpdateByTargets(FusionFilter& filter,
   outcome.verdict.update = FusionUpdate::kTargets;
   outcome.verdict.sensed_at = filter.now();
   const int size = filter.layout().size();
-  const Exposure exposure = ExposureOf(filter, camera);
+  const PixelExposure exposure = ExposureOf(filter, camera);
 
   std::vector<Candidate> candidates;
   for (const TargetPixel& pixel : pixels) {
     const SurveyedTarget& target = targets[static_cast<std::size_t>(pixel.target)];
-    const auto prediction = Predict(exposure, filter.state(), target);
+    const auto prediction = PredictPixel(exposure, filter.state(), target);
     if (!prediction) {
       outcome.rejected.push_back(
           {pixel.target, "behind_camera", std::numeric_limits<double>::quiet_NaN()});

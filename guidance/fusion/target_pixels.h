@@ -49,6 +49,15 @@ struct PixelPrediction {
   Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, FusionLayout::kMost> by_error;
   Eigen::Matrix<double, 2, 3> by_target_px_per_m;
 };
+struct PixelExposure {
+  const FusionLayout& layout;
+  const CameraModel& camera;
+  Eigen::Vector3d rate_rad_s;  // without its bias
+  bool is_moving = false;      // what does not move says nothing of the clock
+};
+Result<PixelPrediction, CameraModelFailure> PredictPixel(const PixelExposure& exposure,
+                                                         const FusionState& state,
+                                                         const SurveyedTarget& target);
 Result<PixelPrediction, CameraModelFailure> PredictPixel(const FusionFilter& filter,
                                                          const CameraModel& camera,
                                                          const SurveyedTarget& target);

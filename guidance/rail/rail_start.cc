@@ -17,6 +17,10 @@ constexpr double kLeastRest_s = 2.0;
 constexpr std::size_t kStartImages = 5;
 // Of the noise of the other axes.
 constexpr double kFrozen = 1e-6;
+// Of the focal length: what targets may be off when all is as well known as it can be; and how near
+// they may stand.
+constexpr double kAstray = 0.02;
+constexpr double kNear_m = 1.0;
 // A gyro's bias over its sigma.
 constexpr double kMostBias = 8.0;
 
@@ -164,7 +168,10 @@ Result<Eigen::Quaterniond, RailStartFailure> FindStartAttitude(const RailSetup& 
   }
   // Far off everywhere: these are other targets, or it stands elsewhere.
   least = MeanOff(setup, recording, headed(best_rad), 0.25 * setup.camera->model.fx_px);
-  if (least > 0.02 * setup.camera->model.fx_px) {
+  const RailCamera& camera = *setup.camera;
+  const double unsure = camera.sigma_rotation_rad +
+                        std::hypot(camera.sigma_position_m, setup.start.sigma_position_m) / kNear_m;
+  if (least > (kAstray + 3.0 * unsure) * camera.model.fx_px) {
     return Fail({.fault = RailStartFault::kNoTargetFits, .off_px = least});
   }
   return headed(best_rad);

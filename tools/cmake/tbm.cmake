@@ -43,6 +43,9 @@ elseif(NOT CMAKE_CROSSCOMPILING)
   set(tbm_edge_optimisation ${tbm_test_optimisation} $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
 endif()
 
+# What computes once a day, because a person asks (calibrations, set-ups, studies), is a folder that sets
+# TBM_RARE: one of its files takes the compiler two minutes at -O3 and ten seconds at -O1.
+
 # What nearly every file includes, compiled once for each tree: a third less time for a test or an edge.
 # What computes gets it in the instrumented trees only; in the others an include that it lacks is noticed.
 set(tbm_common_headers
@@ -70,15 +73,19 @@ function(tbm_optimise target)
     target_link_libraries(${target} PRIVATE fmt::fmt)
   elseif(TBM_SANITIZE)
     tbm_use_precompiled(${target} tbm_precompiled)
+  elseif(TBM_RARE)
+    target_compile_options(${target} PRIVATE ${tbm_edge_optimisation})
   endif()
 endfunction()
 
-# In trees that nobody edits in, a library is compiled in groups of files: what they all include is
-# read once. The optimised tree takes each file alone and notices an include that is lacking. A library
-# whose files use one name for different things is ALONE everywhere.
+# Edges, and in trees that nobody edits in all libraries, are compiled in groups of files: what they
+# all include is read once. What computes is taken file by file in the optimised tree, which notices an
+# include that is lacking. A library whose files use one name for different things is ALONE everywhere.
 function(tbm_group target is_alone)
-  if((TBM_SANITIZE OR CMAKE_CROSSCOMPILING) AND NOT is_alone)
+  if((TBM_SANITIZE OR CMAKE_CROSSCOMPILING OR TBM_EDGE) AND NOT is_alone)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
+    # A group is a file for GCC, and what is local to one of its members is then local to an include.
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
   endif()
 endfunction()
 
