@@ -82,7 +82,7 @@ endfunction()
 # all include is read once. What computes is taken file by file in the optimised tree, which notices an
 # include that is lacking. A library whose files use one name for different things is ALONE everywhere.
 function(tbm_group target is_alone)
-  if((TBM_SANITIZE OR CMAKE_CROSSCOMPILING OR TBM_EDGE) AND NOT is_alone)
+  if((TBM_SANITIZE MATCHES "address" OR CMAKE_CROSSCOMPILING OR TBM_EDGE) AND NOT is_alone)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
     # A group is a file for GCC, and what is local to one of its members is then local to an include.
     target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
