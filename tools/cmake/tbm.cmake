@@ -18,10 +18,6 @@ if(TBM_SANITIZE)
   endif()
   target_link_options(tbm_options INTERFACE -fsanitize=${TBM_SANITIZE})
 endif()
-# A third of the time of the linker that is asked otherwise. It does not know clang's sanitizers.
-if(NOT CMAKE_CROSSCOMPILING)
-  target_link_options(tbm_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-fuse-ld=gold>)
-endif()
 # Aravis asks for it; what is precompiled must have been asked the same.
 target_compile_options(tbm_options INTERFACE -pthread)
 

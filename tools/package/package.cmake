@@ -103,6 +103,7 @@ set(tools_depends
   "libglib2.0-0 (>= 2.74)"
   "libgoogle-glog0v6 (>= 0.6.0)"
   "liblapack3 | liblapack.so.3"
+  "libmodbus5 (>= 3.1.6)"
   "libopencv-calib3d406 (>= 4.6.0+dfsg)"
   "libopencv-core406 (>= 4.6.0+dfsg)"
   "libopencv-features2d406 (>= 4.6.0+dfsg)"
