@@ -71,4 +71,19 @@ struct CalibrateRigRequest {
 // `tbm calibrate rig`: a rig file of its parts, and what it is worth at its points.
 ExitCode RunCalibrateRig(const CalibrateRigRequest& request, const Console& console);
 
+struct CalibrateImuRequest {
+  std::string run;  // folder, as of `tbm line`
+  std::string out;  // a rail.yaml; its .json beside it
+  // How far the camera's section may be off, one sigma.
+  double first_rotation_deg = 1.0;
+  double first_position_mm = 50.0;
+  double first_time_offset_ms = 20.0;
+  bool force = false;
+};
+
+// `tbm calibrate imu`: how a trolley's camera is built to its inertial unit, and the offset of
+// their clocks, from a run past targets. kBadInput, with the missing motion named, where the run
+// does not say enough.
+ExitCode RunCalibrateImu(const CalibrateImuRequest& request, const Console& console);
+
 }  // namespace tbm

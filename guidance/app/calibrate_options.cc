@@ -18,7 +18,8 @@ constexpr const char* kCalibrateHelp =
     "  tbm calibrate tilt table --board chessboard:9x6:25 --camera camera.yaml --out tilt.yaml\n"
     "  tbm calibrate target placements --nominal drawing.csv --out target.yaml\n"
     "  tbm calibrate rig --camera camera.yaml --tilt tilt.yaml --target target.yaml --points "
-    "points.yaml --out rig.yaml";
+    "points.yaml --out rig.yaml\n"
+    "  tbm calibrate imu run_0412 --out rail.yaml";
 
 constexpr const char* kCameraHelp =
     "FOLDER holds grey pictures (PNG, PGM, TIFF) of one board, all by the same camera, not "
@@ -85,6 +86,20 @@ constexpr const char* kRigHelp =
     "  tbm calibrate rig --camera camera.yaml --tilt tilt.yaml --target target.yaml --points "
     "points.yaml\n"
     "      --out rig.yaml --distance-m 5 --report report";
+
+constexpr const char* kImuHelp =
+    "RUN is a folder as for tbm line, driven for this: past six or more surveyed targets in depth, "
+    "four\n"
+    "of them in view at a time, also while the trolley rests at first; on the way it is yawed, "
+    "nodded and\n"
+    "rolled by about ten degrees. The section camera of its rail.yaml is the first guess; --out "
+    "gets that\n"
+    "rail.yaml with the camera as found (rotation, position_m, time_offset_s and their sigmas), "
+    "and beside\n"
+    "it a .json with the covariance. What motion is missing is said, with exit code 2.\n"
+    "\n"
+    "Example\n"
+    "  tbm calibrate imu run_0412 --out rail.yaml";
 
 void AddCamera(CLI::App* calibrate, CalibrateCameraRequest& request) {
   CLI::App* camera = calibrate->add_subcommand("camera", "Camera from pictures of a board");
@@ -169,17 +184,38 @@ void AddRig(CLI::App* calibrate, CalibrateRigRequest& request) {
   rig->add_flag("--force,-f", request.force, "replace existing files");
 }
 
+void AddImu(CLI::App* calibrate, CalibrateImuRequest& request) {
+  CLI::App* imu =
+      calibrate->add_subcommand("imu", "How a trolley's camera is built to its inertial unit");
+  imu->footer(kImuHelp);
+  imu->add_option("RUN", request.run, "folder of the run")->required();
+  imu->add_option("--out,-o", request.out, "rail.yaml to write; - is the standard output")
+      ->required();
+  imu->add_option("--first-rotation-deg", request.first_rotation_deg, "sigma of the first guess")
+      ->check(CLI::Range(1e-3, 5.0))
+      ->capture_default_str();
+  imu->add_option("--first-position-mm", request.first_position_mm, "sigma of the first guess")
+      ->check(CLI::Range(1e-2, 1000.0))
+      ->capture_default_str();
+  imu->add_option(
+         "--first-time-offset-ms", request.first_time_offset_ms, "sigma of the first guess")
+      ->check(CLI::Range(1e-3, 100.0))
+      ->capture_default_str();
+  imu->add_flag("--force,-f", request.force, "replace existing files");
+}
+
 }  // namespace
 
 CLI::App* AddCalibrate(CLI::App& app, CalibrateRequests& requests) {
-  CLI::App* calibrate =
-      app.add_subcommand("calibrate", "Camera, inclinometers, LED board, and the rig file of them");
+  CLI::App* calibrate = app.add_subcommand(
+      "calibrate", "Camera, inclinometers, LED board, rig file; trolley's camera");
   calibrate->footer(kCalibrateHelp);
   calibrate->require_subcommand(1);
   AddCamera(calibrate, requests.camera);
   AddTilt(calibrate, requests.tilt);
   AddTarget(calibrate, requests.target);
   AddRig(calibrate, requests.rig);
+  AddImu(calibrate, requests.imu);
   return calibrate;
 }
 
@@ -189,7 +225,8 @@ ExitCode RunCalibrate(const CLI::App& calibrate,
   if (calibrate.got_subcommand("camera")) return RunCalibrateCamera(requests.camera, console);
   if (calibrate.got_subcommand("tilt")) return RunCalibrateTilt(requests.tilt, console);
   if (calibrate.got_subcommand("target")) return RunCalibrateTarget(requests.target, console);
-  return RunCalibrateRig(requests.rig, console);
+  if (calibrate.got_subcommand("rig")) return RunCalibrateRig(requests.rig, console);
+  return RunCalibrateImu(requests.imu, console);
 }
 
 }  // namespace tbm

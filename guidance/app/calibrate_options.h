@@ -14,9 +14,10 @@ struct CalibrateRequests {
   CalibrateTiltRequest tilt;
   CalibrateTargetRequest target;
   CalibrateRigRequest rig;
+  CalibrateImuRequest imu;
 };
 
-// Adds `calibrate` with its commands camera, tilt, target and rig.
+// Adds `calibrate` with its commands camera, tilt, target, rig and imu.
 CLI::App* AddCalibrate(CLI::App& app, CalibrateRequests& requests);
 
 // Runs the one that was parsed; `calibrate` is what AddCalibrate returned.

@@ -165,7 +165,11 @@ class LineReader {
 Result<LineFile, FileFaults> ReadLineFile(const std::string& path) {
   auto text = ReadTextFile(path);
   if (!text) return Failure{FileFaults{text.error()}};
-  auto parsed = CsvTable::Parse(std::move(text).value(), path, kColumns);
+  return ParseLineFile(std::move(text).value(), path);
+}
+
+Result<LineFile, FileFaults> ParseLineFile(std::string text, const std::string& path) {
+  auto parsed = CsvTable::Parse(std::move(text), path, kColumns);
   if (!parsed) return Failure{FileFaults{parsed.error()}};
   CsvTable table = std::move(parsed).value();
   LineFile line;

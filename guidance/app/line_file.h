@@ -18,5 +18,6 @@ struct LineFile {
 
 // Errors: every fault found, up to twenty, with file, line and column.
 Result<LineFile, FileFaults> ReadLineFile(const std::string& path);
+Result<LineFile, FileFaults> ParseLineFile(std::string text, const std::string& path);
 
 }  // namespace tbm

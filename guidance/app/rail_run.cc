@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <initializer_list>
 #include <map>
 #include <set>
 
@@ -40,18 +41,21 @@ constexpr std::string_view kTiltSensor = "trolley";
 // Noise never shows one number so often on end.
 constexpr std::size_t kFrozenRows = 12;
 constexpr std::size_t kMostFaults = 20;
+constexpr double kUnitLength = 1e-3;
+constexpr std::size_t kLargestYaml = std::size_t{1} << 20;
+constexpr std::size_t kLargestTable = std::size_t{1} << 30;
 
 class RailRunLoader {
  public:
-  explicit RailRunLoader(const std::string& folder) : folder_(folder) {}
+  RailRunLoader(const std::string& folder, RailRunTexts texts)
+      : folder_(folder), texts_(std::move(texts)) {}
 
-  Result<RailRun, FileFaults> Load(bool has_run) {
-    std::error_code ignored;
-    if (!fs::is_directory(folder_, ignored)) {
-      return Failure{FileFaults{
-          {folder_, 0, "", "is not a folder; a rail run is a folder with rail.yaml and imu.csv"}}};
-    }
-    if (!has_run) return LoadBeforeRun();
+  Result<RailRun, FileFaults> LoadBeforeRun() {
+    LoadSetup();
+    LoadTargets();
+    return Whole();
+  }
+  Result<RailRun, FileFaults> Load() {
     LoadSetup();
     LoadImu();
     LoadTilts();
@@ -67,11 +71,6 @@ class RailRunLoader {
   }
 
  private:
-  Result<RailRun, FileFaults> LoadBeforeRun() {
-    LoadSetup();
-    LoadTargets();
-    return Whole();
-  }
   Result<RailRun, FileFaults> Whole() {
     if (!faults_.empty()) return Failure{std::move(faults_)};
     return std::move(run_);
@@ -79,17 +78,14 @@ class RailRunLoader {
   std::string PathOf(std::string_view name) const {
     return (fs::path(folder_) / fs::path(std::string(name))).string();
   }
-  bool Has(std::string_view name) const {
-    std::error_code ignored;
-    return fs::exists(PathOf(name), ignored);
-  }
+  bool Has(std::string_view name) const { return texts_.contains(name); }
   bool Fault(FileFault fault) {
     if (faults_.size() < kMostFaults) faults_.push_back(std::move(fault));
     return false;
   }
 
   void LoadSetup() {
-    auto setup = LoadRailSetup(PathOf("rail.yaml"));
+    auto setup = ParseRailSetup(texts_["rail.yaml"], PathOf("rail.yaml"));
     if (setup) {
       run_.setup = std::move(setup).value();
       return;
@@ -103,12 +99,7 @@ class RailRunLoader {
   }
 
   std::optional<CsvTable> Table(std::string_view name, std::span<const std::string_view> columns) {
-    auto text = ReadTextFile(PathOf(name));
-    if (!text) {
-      Fault(text.error());
-      return {};
-    }
-    auto table = CsvTable::Parse(std::move(text).value(), PathOf(name), columns);
+    auto table = CsvTable::Parse(std::move(texts_[std::string(name)]), PathOf(name), columns);
     if (!table) {
       Fault(table.error());
       return {};
@@ -438,7 +429,16 @@ class RailRunLoader {
       if (!Stamp(*table, row, false, &last, &truth.at)) return;
       if (!Numbers(*table, row, kTruthColumns, 1, v.data())) return;
       truth.position_world_m = {v[0], v[1], v[2]};
-      truth.world_from_imu = Eigen::Quaterniond(v[3], v[4], v[5], v[6]).normalized();
+      truth.world_from_imu = Eigen::Quaterniond(v[3], v[4], v[5], v[6]);
+      const double norm = truth.world_from_imu.norm();
+      if (!(std::abs(norm - 1.0) < kUnitLength)) {
+        Fault(
+            table->FaultAt(row,
+                           *table->Column("qw"),
+                           fmt::format("qw,qx,qy,qz have the length {:.4g}; it must be 1", norm)));
+        return;
+      }
+      truth.world_from_imu.normalize();
       run_.truth.push_back(truth);
     }
   }
@@ -483,20 +483,67 @@ class RailRunLoader {
   }
 
   const std::string folder_;
+  RailRunTexts texts_;
   RailRun run_;
   FileFaults faults_;
   std::map<std::string, int> target_at_;
   std::set<std::string> known_marks_;
 };
 
+// The files of a folder that are needed, and those of `others` that are there.
+Result<RailRunTexts, FileFaults> ReadTexts(const std::string& folder,
+                                           std::initializer_list<const char*> needed,
+                                           std::initializer_list<const char*> others) {
+  std::error_code ignored;
+  if (!fs::is_directory(folder, ignored)) {
+    return Failure{FileFaults{
+        {folder, 0, "", "is not a folder; a rail run is a folder with rail.yaml and imu.csv"}}};
+  }
+  RailRunTexts texts;
+  FileFaults faults;
+  const auto read = [&](const char* name) {
+    const bool is_yaml = std::string_view(name).ends_with(".yaml");
+    auto text =
+        ReadTextFile((fs::path(folder) / name).string(), is_yaml ? kLargestYaml : kLargestTable);
+    if (text) {
+      texts.emplace(name, std::move(text).value());
+    } else {
+      faults.push_back(text.error());
+    }
+  };
+  for (const char* name : needed) read(name);
+  for (const char* name : others) {
+    if (fs::exists(fs::path(folder) / name, ignored)) read(name);
+  }
+  if (!faults.empty()) return Failure{std::move(faults)};
+  return texts;
+}
+
 }  // namespace
 
+Result<RailRun, FileFaults> ParseRailRun(const std::string& folder, RailRunTexts texts) {
+  return RailRunLoader(folder, std::move(texts)).Load();
+}
+
 Result<RailRun, FileFaults> ReadRailRun(const std::string& folder) {
-  return RailRunLoader(folder).Load(true);
+  auto texts = ReadTexts(folder,
+                         {"rail.yaml", "imu.csv"},
+                         {"tilt.csv",
+                          "targets.csv",
+                          "centres.csv",
+                          "frames.csv",
+                          "ground_frames.csv",
+                          "odometer.csv",
+                          "displacement.csv",
+                          "truth.csv"});
+  if (!texts) return Failure{texts.error()};
+  return ParseRailRun(folder, std::move(texts).value());
 }
 
 Result<RailRun, FileFaults> ReadRailSetup(const std::string& folder) {
-  return RailRunLoader(folder).Load(false);
+  auto texts = ReadTexts(folder, {"rail.yaml"}, {"targets.csv"});
+  if (!texts) return Failure{texts.error()};
+  return RailRunLoader(folder, std::move(texts).value()).LoadBeforeRun();
 }
 
 }  // namespace tbm

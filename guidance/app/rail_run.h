@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -39,6 +40,10 @@ struct RailRun {
 // nobody knows, sensors that show one and the same number, or their largest, for longer than noise
 // allows.
 Result<RailRun, FileFaults> ReadRailRun(const std::string& folder);
+
+// The same of the texts of its files, by their names. What is not among them is not there.
+using RailRunTexts = std::map<std::string, std::string, std::less<>>;
+Result<RailRun, FileFaults> ParseRailRun(const std::string& folder, RailRunTexts texts);
 
 // What a run has before it begins: rail.yaml and targets.csv.
 Result<RailRun, FileFaults> ReadRailSetup(const std::string& folder);

@@ -205,10 +205,4 @@ Result<RailSetup, RigFileFaults> ParseRailSetup(std::string_view yaml, const std
   return ReadYaml(yaml, file, [](const YamlNode& root) { return Read(root); });
 }
 
-Result<RailSetup, RigFileFaults> LoadRailSetup(const std::string& path) {
-  const auto text = ReadConfigText(path, "rail.yaml");
-  if (!text) return Failure{text.error()};
-  return ParseRailSetup(*text, path);
-}
-
 }  // namespace tbm

@@ -13,6 +13,5 @@ inline constexpr double kBiasTime_s = 100.0;
 
 // rail.yaml (FORMATS §5) in SI units. All faults are collected, never only the first.
 Result<RailSetup, RigFileFaults> ParseRailSetup(std::string_view yaml, const std::string& file);
-Result<RailSetup, RigFileFaults> LoadRailSetup(const std::string& path);
 
 }  // namespace tbm

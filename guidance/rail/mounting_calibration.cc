@@ -35,9 +35,9 @@ constexpr double kStill_m_s = 2e-4;
 
 constexpr int kNode = 9;  // position, velocity, attitude: the first rows of FusionLayout
 constexpr int kShared = 13;
-constexpr int kOffset = 6;
-constexpr int kRotation = 7;
-constexpr int kPosition = 10;
+constexpr int kOffset = MountingCalibration::kTimeOffset;
+constexpr int kRotation = MountingCalibration::kRotation;
+constexpr int kPosition = MountingCalibration::kPosition;
 
 using Sparse = Eigen::SparseMatrix<double>;
 using Matrix22 = Eigen::Matrix<double, kNode + kShared, kNode + kShared>;

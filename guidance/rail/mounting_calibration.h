@@ -20,6 +20,9 @@ struct MountingCalibration {
   Eigen::Vector3d accel_bias_m_s2 = Eigen::Vector3d::Zero();
   // Of gyro bias [rad/s], accelerometer bias [m/s2], time offset [s], rotation about the camera's
   // axes [rad] and position [m], in this order.
+  static constexpr int kTimeOffset = 6;
+  static constexpr int kRotation = 7;
+  static constexpr int kPosition = 10;
   Eigen::Matrix<double, 13, 13> covariance = Eigen::Matrix<double, 13, 13>::Zero();
   int rounds = 0;
   std::size_t images = 0;

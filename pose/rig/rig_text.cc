@@ -46,16 +46,12 @@ std::string YamlText(const std::string& text) {
   return quoted + "\"";
 }
 
-std::string CameraSectionYaml(const Rig& rig) {
-  const CameraModel& c = rig.camera;
-  const Eigen::Vector4d& sigma = rig.intrinsics_sigma_px;
-  std::string text = fmt::format(
-      "camera:\n  image_width: {}\n  image_height: {}\n  distortion_model: plumb_bob\n"
+std::string LensYaml(const CameraModel& c) {
+  return fmt::format(
+      "  image_width: {}\n  image_height: {}\n  distortion_model: plumb_bob\n"
       "  camera_matrix: {{rows: 3, cols: 3, data: [{}, 0.0, {}, 0.0, {}, {}, 0.0, 0.0, 1.0]}}\n"
       "  distortion_coefficients: {{rows: 1, cols: 5, data: [{}, {}, {}, {}, {}]}}   # k1 k2 p1 p2 "
-      "k3\n"
-      "  residual_px: {:.9g}          # sigma of one coordinate of a point\n  intrinsics_sigma_px: "
-      "[{}, {}, {}, {}]   # fx fy cx cy\n",
+      "k3\n",
       c.image_width_px,
       c.image_height_px,
       c.fx_px,
@@ -66,12 +62,20 @@ std::string CameraSectionYaml(const Rig& rig) {
       c.k2,
       c.p1,
       c.p2,
-      c.k3,
-      rig.calibration_residual_px,
-      sigma[0],
-      sigma[1],
-      sigma[2],
-      sigma[3]);
+      c.k3);
+}
+
+std::string CameraSectionYaml(const Rig& rig) {
+  const Eigen::Vector4d& sigma = rig.intrinsics_sigma_px;
+  std::string text = "camera:\n" + LensYaml(rig.camera) +
+                     fmt::format(
+                         "  residual_px: {:.9g}          # sigma of one coordinate of a point\n"
+                         "  intrinsics_sigma_px: [{}, {}, {}, {}]   # fx fy cx cy\n",
+                         rig.calibration_residual_px,
+                         sigma[0],
+                         sigma[1],
+                         sigma[2],
+                         sigma[3]);
   if (rig.gain_dn_per_electron) {
     text += fmt::format("  gain_dn_per_electron: {}\n", *rig.gain_dn_per_electron);
   }

@@ -15,7 +15,9 @@ std::string RigYaml(const Rig& rig);
 // Its parts, as a calibration's files hold them too. Each ends with a new line.
 std::string CameraSectionYaml(const Rig& rig);
 std::string TargetYaml(const std::vector<Led>& leds);
-std::string TiltMountYaml(const TiltMount& mount);  // the members, to stand under its name
+// The members only, to stand under a section's name.
+std::string LensYaml(const CameraModel& lens);
+std::string TiltMountYaml(const TiltMount& mount);
 std::string PointsYaml(const std::vector<NamedPoint>& points);
 
 // Text as YAML takes it in one line, whatever it holds.
