@@ -28,7 +28,8 @@ std::string Table(const RailLine& line) {
   for (const RailPoint& point : line.points) {
     const Eigen::Vector3d& p = point.position_world_m;
     const Eigen::Quaterniond& q = point.world_from_imu;
-    const Eigen::Vector3d sigma_mm = 1e3 * point.sigma_world_m;
+    // Rounded to no more than the last digit: nothing is known without an error.
+    const Eigen::Vector3d sigma_mm = (1e3 * point.sigma_world_m).cwiseMax(1e-3);
     fmt::format_to(std::back_inserter(text),
                    "{},{:.6f},{:.6f},{:.6f},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{:.3f},{:.3f},"
                    "{:.3f},{}\n",

@@ -344,6 +344,11 @@ class RailRunLoader {
       pixel.target = known->second;
       if (!Number(*table, row, "u_px", &pixel.pixel_px.x())) return;
       if (!Number(*table, row, "v_px", &pixel.pixel_px.y())) return;
+      if (table->Column("sigma_px") && !Number(*table, row, "sigma_px", &pixel.sigma_px)) return;
+      if (table->Column("sigma_px") && !(pixel.sigma_px > 0.0)) {
+        Fault(table->FaultAt(row, *table->Column("sigma_px"), "must be above 0"));
+        return;
+      }
       if (images.empty() || images.back().stamped_at < at) {
         images.push_back({at, {}});
         seen.clear();

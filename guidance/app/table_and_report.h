@@ -20,12 +20,18 @@ class TableAndReport {
   bool has_report() const { return has_report_; }
 
   std::optional<std::string> Obstacle() const {
+    if (has_report_ && report_.path() == table_.path()) {
+      return table_.path() + ": .json is the name of the report beside it; give another ending";
+    }
     if (auto obstacle = table_.Obstacle()) return obstacle;
     return has_report_ ? report_.Obstacle() : std::nullopt;
   }
   std::optional<std::string> Write(std::string_view table, std::string_view report) const {
-    if (auto fault = table_.Write(table)) return fault;
-    return has_report_ ? report_.Write(report) : std::nullopt;
+    // No table without the report that says what it is worth.
+    if (has_report_) {
+      if (auto fault = report_.Write(report)) return fault;
+    }
+    return table_.Write(table);
   }
 
  private:

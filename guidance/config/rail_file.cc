@@ -85,6 +85,13 @@ void ReadMountedCamera(const YamlNode& node,
   if (position) *in_imu_m = {(*position)[0], (*position)[1], (*position)[2]};
 }
 
+// Required, as all such sigmas: without it a thing would count as built in exactly.
+double SigmaOfRotation(YamlSection* keys) {
+  const auto sigma_deg = keys->Require("sigma_rotation_deg", "how well rotation is known, e.g. 0.1")
+                             .Number({0.0, 10.0, "deg", true});
+  return DegToRad(sigma_deg.value_or(1.0));
+}
+
 std::optional<RailCamera> ReadCamera(const YamlNode& node) {
   if (!IsSection(node)) return {};
   YamlSection keys(node);
@@ -94,12 +101,15 @@ std::optional<RailCamera> ReadCamera(const YamlNode& node) {
       keys.Require("residual_px", "sigma of one coordinate of an image point, e.g. 0.1")
           .Number({0.0, 100.0, "px", true});
   camera.residual_px = residual_px.value_or(1.0);
-  double sigma_deg = 0.0;
-  keys.Number("sigma_rotation_deg", 0.0, 10.0, "deg", &sigma_deg);
-  camera.sigma_rotation_rad = DegToRad(sigma_deg);
-  keys.Scaled("sigma_position_mm", 0.0, 1000.0, "mm", 1e3, &camera.sigma_position_m);
+  camera.sigma_rotation_rad = SigmaOfRotation(&keys);
+  const auto sigma_mm = keys.Require("sigma_position_mm", "how well position_m is known, e.g. 0.5")
+                            .Number({0.0, 1000.0, "mm", true});
+  camera.sigma_position_m = 1e-3 * sigma_mm.value_or(1.0);
   keys.Number("time_offset_s", -1.0, 1.0, "s", &camera.time_offset_s);
-  keys.Number("sigma_time_offset_s", 0.0, 1.0, "s", &camera.sigma_time_offset_s);
+  const auto sigma_s =
+      keys.Require("sigma_time_offset_s", "how well time_offset_s is known, e.g. 0.005")
+          .Number({0.0, 1.0, "s", true});
+  camera.sigma_time_offset_s = sigma_s.value_or(1.0);
   keys.RefuseOthers();
   return camera;
 }
@@ -115,6 +125,7 @@ std::optional<RailGroundCamera> ReadGroundCamera(const YamlNode& node) {
   const auto sigma_mm = keys.Require("sigma_height_mm", "how well that is known, e.g. 5")
                             .Number({0.0, 1000.0, "mm", true});
   camera.sigma_height_m = 1e-3 * sigma_mm.value_or(1.0);
+  camera.sigma_rotation_rad = SigmaOfRotation(&keys);
   keys.Scaled("sigma_mm", 0.0, 1000.0, "mm", 1e3, &camera.sigma_m);
   keys.RefuseOthers();
   return camera;
@@ -134,7 +145,11 @@ std::optional<RailOdometer> ReadOdometer(const YamlNode& node) {
   const auto sigma_mm =
       keys.Require("sigma_mm", "of one reading, e.g. 0.5").Number({0.0, 1000.0, "mm", true});
   odometer.sigma_m = 1e-3 * sigma_mm.value_or(1.0);
-  keys.Scaled("sigma_scale_ppm", 0.0, 1e5, "ppm", 1e6, &odometer.sigma_scale);
+  const auto scale_ppm =
+      keys.Require("sigma_scale_ppm", "how well the wheel's circumference is known, e.g. 2000")
+          .Number({0.0, 1e5, "ppm", true});
+  odometer.sigma_scale = 1e-6 * scale_ppm.value_or(1.0);
+  odometer.sigma_rotation_rad = SigmaOfRotation(&keys);
   const auto side_mm_s =
       keys.Require("sigma_side_mm_s", "how fast the wheel may leave the rail's direction, e.g. 5")
           .Number({0.0, 1e4, "mm/s", true});
@@ -152,7 +167,9 @@ void ReadStart(const YamlNode& node, RailStart* start) {
   const auto position =
       keys.Require("position_m", "[x, y, z] of the unit in the world").Numbers(3, {-1e8, 1e8, "m"});
   if (position) start->position_world_m = {(*position)[0], (*position)[1], (*position)[2]};
-  keys.Scaled("sigma_position_mm", 0.0, 1e5, "mm", 1e3, &start->sigma_position_m);
+  const auto sigma_mm = keys.Require("sigma_position_mm", "how well position_m is known, e.g. 0.5")
+                            .Number({0.0, 1e5, "mm", true});
+  start->sigma_position_m = 1e-3 * sigma_mm.value_or(1.0);
   const auto at_rest_s =
       keys.Require("at_rest_s", "how long the trolley rests at first, at least 2 s")
           .Number({2.0, 86'400.0, "s"});

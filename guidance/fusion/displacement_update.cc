@@ -15,7 +15,8 @@ FusionVerdict UpdateByImageDisplacement(FusionFilter& filter,
                                         const ImageDisplacement& displacement) {
   const FusionState& state = filter.state();
   const FusionLayout& layout = filter.layout();
-  const Eigen::Matrix3d vehicle = vehicle_from_imu.toRotationMatrix();
+  const Eigen::Matrix3d vehicle =
+      (ExpRotation({0.0, 0.0, state.image_turn_rad}) * vehicle_from_imu).toRotationMatrix();
   const Eigen::Matrix3d imu_from_world = at_first.world_from_imu.conjugate().toRotationMatrix();
   const Eigen::Vector3d in_imu_m =
       imu_from_world * (state.motion.position_world_m - at_first.position_world_m);
@@ -32,6 +33,10 @@ FusionVerdict UpdateByImageDisplacement(FusionFilter& filter,
   if (layout.Has(FusionOption::kImageScale)) {
     measurement.h.block<2, 1>(0, layout.At(FusionOption::kImageScale)) =
         -told_by_true * told_by_true * in_vehicle_m.head<2>();
+  }
+  if (layout.Has(FusionOption::kImageTurn)) {
+    measurement.h.block<2, 1>(0, layout.At(FusionOption::kImageTurn)) =
+        told_by_true * Eigen::Vector2d(-in_vehicle_m.y(), in_vehicle_m.x());
   }
   measurement.residual = displacement.told_m - told_by_true * in_vehicle_m.head<2>();
   measurement.noise = displacement.sigma_m * displacement.sigma_m * FusionMatrix::Identity(2, 2);

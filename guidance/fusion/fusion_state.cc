@@ -25,7 +25,9 @@ void VisitPlain(State& state, const FusionLayout& layout, const Visit& visit) {
   number(FusionOption::kTimeOffset, state.time_offset_s);
   block(layout.At(FusionOption::kCameraPosition), state.camera_in_imu_m);
   number(FusionOption::kOdometerScale, state.odometer_scale);
+  block(layout.At(FusionOption::kOdometerTurn), state.odometer_turn_rad);
   number(FusionOption::kImageScale, state.image_scale);
+  number(FusionOption::kImageTurn, state.image_turn_rad);
   if (layout.modes() > 0) block(layout.modes_at(), state.modes);
 }
 
@@ -47,6 +49,7 @@ int FusionLayout::SizeOf(FusionOption option) {
   switch (option) {
     case FusionOption::kTiltOffset:
     case FusionOption::kGravity:
+    case FusionOption::kOdometerTurn:
       return 2;
     case FusionOption::kCameraRotation:
     case FusionOption::kCameraPosition:
@@ -54,6 +57,7 @@ int FusionLayout::SizeOf(FusionOption option) {
     case FusionOption::kTimeOffset:
     case FusionOption::kOdometerScale:
     case FusionOption::kImageScale:
+    case FusionOption::kImageTurn:
       return 1;
   }
   return 0;

@@ -19,9 +19,11 @@ enum class FusionOption {
   kCameraRotation,  // 3: of the camera in the unit, about the camera's axes [rad]
   kCameraPosition,  // 3: of the camera in the unit [m]
   kOdometerScale,   // 1: true distance over told distance, minus one
+  kOdometerTurn,    // 2: of the vehicle's frame in the unit, about its y and z [rad]
   kImageScale,      // 1: true height of the camera over the ground over the assumed one, minus one
+  kImageTurn,       // 1: of the ground camera in the unit, about the plumb line [rad]
 };
-inline constexpr int kFusionOptions = 7;
+inline constexpr int kFusionOptions = 9;
 
 // Where each block of the error state stands. Position [m] and velocity [m/s] in the world,
 // attitude [rad] about the axes of the unit (R_true = R Exp(e)), then gyro [rad/s] and
@@ -36,7 +38,7 @@ class FusionLayout {
   static constexpr int kAccelBias = 12;
   static constexpr int kCore = 15;
   static constexpr int kMostModes = 24;
-  static constexpr int kMost = kCore + 13 + kMostModes;
+  static constexpr int kMost = kCore + 16 + kMostModes;
 
   FusionLayout() { at_.fill(-1); }
   // `options` in any order, each once; 0 <= modes <= kMostModes.
@@ -72,7 +74,9 @@ struct FusionState {
   Eigen::Quaterniond camera_from_imu = Eigen::Quaterniond::Identity();
   Eigen::Vector3d camera_in_imu_m = Eigen::Vector3d::Zero();
   double odometer_scale = 0.0;
+  Eigen::Vector2d odometer_turn_rad = Eigen::Vector2d::Zero();
   double image_scale = 0.0;
+  double image_turn_rad = 0.0;
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, FusionLayout::kMostModes, 1> modes;
 };
 

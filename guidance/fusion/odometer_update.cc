@@ -14,7 +14,9 @@ FusionVerdict UpdateByOdometer(FusionFilter& filter,
                                std::optional<double> told_m_s) {
   const FusionState& state = filter.state();
   const FusionLayout& layout = filter.layout();
-  const Eigen::Matrix3d vehicle_from_imu = mounting.vehicle_from_imu.toRotationMatrix();
+  const Eigen::Vector3d turn_rad(0.0, state.odometer_turn_rad.x(), state.odometer_turn_rad.y());
+  const Eigen::Matrix3d vehicle_from_imu =
+      (ExpRotation(turn_rad) * mounting.vehicle_from_imu).toRotationMatrix();
   const Eigen::Matrix3d imu_from_world = state.motion.world_from_imu.conjugate().toRotationMatrix();
   const Eigen::Vector3d in_imu_m_s = imu_from_world * state.motion.velocity_world_m_s;
   const Eigen::Vector3d wheel_m_s =
@@ -24,6 +26,10 @@ FusionVerdict UpdateByOdometer(FusionFilter& filter,
   by_error.block<3, 3>(0, FusionLayout::kAttitude) = vehicle_from_imu * Skew(in_imu_m_s);
   by_error.block<3, 3>(0, FusionLayout::kGyroBias) =
       vehicle_from_imu * Skew(mounting.wheel_in_imu_m);
+  if (layout.Has(FusionOption::kOdometerTurn)) {
+    by_error.block<3, 2>(0, layout.At(FusionOption::kOdometerTurn)) =
+        -Skew(wheel_m_s).rightCols<2>();
+  }
 
   const int rows = told_m_s ? 3 : 2;
   FusionMeasurement measurement;

@@ -13,6 +13,8 @@ constexpr double kMostMeanSigmas = 7.0;
 constexpr double kMostSpread = 2.0;
 constexpr double kMostForceOff_m_s2 = 0.02;
 constexpr double kLeastQuiet_s = 1.0;
+// A sample that ends later than one and a half periods after the one before leaves a gap.
+constexpr double kGapPeriods = 1.5;
 
 // Where the rail is canted the axes feel gravity otherwise, but no more and no less of it, but for
 // what their biases change.
@@ -53,26 +55,35 @@ bool IsQuiet(const QuietMean& window, const RestSignature& rest, double samples)
   return is_even && IsNear(window.gyro, rest.mean_gyro_rad_s, rest.sigma_gyro_rad_s, samples);
 }
 
+double GapBefore(const RailSetup& setup, Timestamp last, const ImuSample& sample) {
+  const double span_s = SecondsBetween(last, sample.ends_at);
+  return span_s > kGapPeriods / setup.imu.rate_hz ? span_s : 0.0;
+}
+
 std::size_t QuietWindowSamples(const RailSetup& setup) {
   return std::max<std::size_t>(8, static_cast<std::size_t>(kWindow_s * setup.imu.rate_hz));
 }
 
 QuietWatch::QuietWatch(const RailSetup& setup, const RestSignature& rest)
-    : rest_(rest), window_samples_(QuietWindowSamples(setup)) {}
+    : setup_(setup), rest_(rest), window_samples_(QuietWindowSamples(setup)) {}
+
+void QuietWatch::Break() {
+  window_.clear();
+  quiet_windows_ = 0;
+  is_told_ = false;
+}
 
 void QuietWatch::Feed(const ImuSample& sample) {
+  if (last_ && GapBefore(setup_, *last_, sample) > 0.0) Break();
+  last_ = sample.ends_at;
   window_.push_back(sample);
   if (window_.size() < window_samples_) return;
   const QuietMean mean = MeanOf(window_, 0, window_.size());
   const Timestamp first = window_.front().ends_at;
   const bool is_quiet =
       IsQuiet(mean, rest_, static_cast<double>(window_.size())) && FeelsGravityAlone(mean, rest_);
+  if (!is_quiet) return Break();
   window_.clear();
-  if (!is_quiet) {
-    quiet_windows_ = 0;
-    is_told_ = false;
-    return;
-  }
   ++quiet_windows_;
   if (quiet_windows_ == 2) span_.begins_at = first;
   if (quiet_windows_ < 3) return;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "guidance/rail/rail_start.h"
@@ -25,14 +26,19 @@ bool IsNear(const Eigen::Vector3d& mean,
 // Whether a window shows no more than the unit's noise, and no rate but its bias.
 bool IsQuiet(const QuietMean& window, const RestSignature& rest, double samples);
 
+// How long samples were missing before this one; 0 when none were.
+double GapBefore(const RailSetup& setup, Timestamp last, const ImuSample& sample);
+
 // Samples in a window of quiet: a quarter of a second.
 std::size_t QuietWindowSamples(const RailSetup& setup);
 
 // Finds the spans in which the unit shows nothing but its noise, as the samples come. A span is
 // told from its first half second on and grows with each window; its first and last window, a
-// quarter of a second each, may hold motion and are no part of it.
+// quarter of a second each, may hold motion and are no part of it. Where samples are missing
+// nobody knows: a span ends there, and another may begin.
 class QuietWatch {
  public:
+  // `setup` stays where it is.
   QuietWatch(const RailSetup& setup, const RestSignature& rest);
 
   void Feed(const ImuSample& sample);
@@ -41,8 +47,12 @@ class QuietWatch {
   const std::vector<RestSpan>& spans() const { return spans_; }
 
  private:
+  void Break();
+
+  const RailSetup& setup_;
   const RestSignature rest_;
   const std::size_t window_samples_;
+  std::optional<Timestamp> last_;
   std::vector<ImuSample> window_;
   std::size_t quiet_windows_ = 0;  // on end
   RestSpan span_;                  // of them

@@ -12,8 +12,6 @@ namespace {
 
 // The covariance is brought forward at least so often.
 constexpr Duration kLongestEpoch = std::chrono::milliseconds(100);
-// A sample that ends later than one and a half periods after the one before leaves a gap.
-constexpr double kGapPeriods = 1.5;
 // What may have happened while samples are missing.
 constexpr double kGapForce_m_s2 = 0.5;
 constexpr double kGapRate_rad_s = 0.05;
@@ -22,6 +20,9 @@ constexpr double kGapRate_rad_s = 0.05;
 constexpr double kStartLevel_rad = 2e-3;
 constexpr double kStartHeading_rad = 5e-3;
 constexpr double kStartVelocity_m_s = 1e-3;
+// By how much a trolley's acceleration may change between two readings of the wheel: an eighth of
+// it times the span is what the mean speed may be off the speed of half way.
+constexpr double kMostChange_m_s2 = 0.2;
 
 std::vector<FusionOption> OptionsOf(const RailSetup& setup) {
   std::vector<FusionOption> options;
@@ -29,8 +30,14 @@ std::vector<FusionOption> OptionsOf(const RailSetup& setup) {
     options = {
         FusionOption::kTimeOffset, FusionOption::kCameraRotation, FusionOption::kCameraPosition};
   }
-  if (setup.odometer) options.push_back(FusionOption::kOdometerScale);
-  if (setup.ground) options.push_back(FusionOption::kImageScale);
+  if (setup.odometer) {
+    options.push_back(FusionOption::kOdometerScale);
+    options.push_back(FusionOption::kOdometerTurn);
+  }
+  if (setup.ground) {
+    options.push_back(FusionOption::kImageScale);
+    options.push_back(FusionOption::kImageTurn);
+  }
   return options;
 }
 
@@ -63,10 +70,13 @@ RailPrior MakeRailPrior(const RailSetup& setup,
   }
   if (setup.odometer) {
     sigma[prior.layout.At(FusionOption::kOdometerScale)] = setup.odometer->sigma_scale;
+    sigma.segment<2>(prior.layout.At(FusionOption::kOdometerTurn))
+        .setConstant(setup.odometer->sigma_rotation_rad);
   }
   if (setup.ground) {
     sigma[prior.layout.At(FusionOption::kImageScale)] =
         setup.ground->sigma_height_m / setup.ground->height_m;
+    sigma[prior.layout.At(FusionOption::kImageTurn)] = setup.ground->sigma_rotation_rad;
   }
   state.modes.setZero(modes);
   if (modes > 0) sigma.tail(modes).setOnes();
@@ -86,11 +96,6 @@ RailPrior MakeRailPrior(const RailSetup& setup,
   prior.covariance.block<3, 3>(FusionLayout::kAttitude, FusionLayout::kAttitude) =
       imu_from_world * attitude.cwiseAbs2().asDiagonal() * imu_from_world.transpose();
   return prior;
-}
-
-double GapBefore(const RailSetup& setup, Timestamp last, const ImuSample& sample) {
-  const double span_s = SecondsBetween(last, sample.ends_at);
-  return span_s > kGapPeriods / setup.imu.rate_hz ? span_s : 0.0;
 }
 
 void FeedUpTo(
@@ -114,20 +119,27 @@ RailFilter::RailFilter(const RailSetup& setup,
       targets_(targets),
       rests_(rests),
       begin_(begin),
-      filter_(
-          prior.layout, prior.state, prior.covariance, setup.imu.noise, setup.gravity_m_s2, begin_),
+      filter_(std::in_place,
+              prior.layout,
+              prior.state,
+              prior.covariance,
+              setup.imu.noise,
+              setup.gravity_m_s2,
+              begin_),
       smoother_(smoother) {}
 
 void RailFilter::Feed(const ImuSample& sample) {
   if (!last_epoch_) EndEpoch();
-  gap_s_ = GapBefore(setup_, filter_.now(), sample);
-  if (gap_s_ > 0.0) gaps_.push_back({filter_.now(), sample.ends_at});
+  gap_s_ = GapBefore(setup_, filter_->now(), sample);
+  if (gap_s_ > 0.0) gaps_.push_back({filter_->now(), sample.ends_at});
+  // Where rest ends it is made sure of, before the motion begins.
+  if (!held_.empty() && (gap_s_ > 0.0 || !SaysRest(sample.ends_at))) EndEpoch();
   while (NextStamp() < sample.ends_at) Advance(sample, NextStamp());
   Advance(sample, sample.ends_at);
 }
 
 void RailFilter::Finish() {
-  if (last_epoch_ && *last_epoch_ < filter_.now()) EndEpoch();
+  if (last_epoch_ && *last_epoch_ < filter_->now()) EndEpoch();
   for (const TrolleyTilt& tilt : std::exchange(tilts_, {})) {
     Outside(tilt.sensed_at, FusionUpdate::kTilt);
   }
@@ -157,15 +169,13 @@ Timestamp RailFilter::NextStamp() const {
 }
 
 void RailFilter::Advance(const ImuSample& sample, Timestamp to) {
-  if (to > filter_.now()) {
+  if (to > filter_->now()) {
     // Also a trolley that rested may have been moved while samples are missing.
-    if (gap_s_ <= 0.0 && rests_now_ && SaysRest(to)) {
-      ImuSample part = sample;
-      part.interval_s = SecondsBetween(filter_.now(), to);
-      part.ends_at = to;
-      filter_.Hold(part);
+    in_gap_ = gap_s_ > 0.0;
+    if (!in_gap_ && rests_now_ && SaysRest(to)) {
+      Hold(sample, to);
     } else {
-      FeedUpTo(filter_, setup_, sample, to, gap_s_);
+      FeedUpTo(*filter_, setup_, sample, to, gap_s_);
     }
   }
   if (NextStamp() <= to) EndEpoch();
@@ -179,19 +189,51 @@ bool RailFilter::SaysRest(Timestamp at) const {
   });
 }
 
+// By something outside of the unit, so lately that rest goes on holding it.
+bool RailFilter::IsHeld(Timestamp at) const {
+  const Timestamp last = fixes_.empty() ? begin_ : fixes_.back();
+  if (!gaps_.empty() && gaps_.back().ends_at > last) return false;
+  return SecondsBetween(last, at) <= kHeld_s;
+}
+
+void RailFilter::Hold(ImuSample sample, Timestamp to) {
+  if (held_.empty()) before_held_.emplace(*filter_);
+  sample.interval_s = SecondsBetween(filter_->now(), to);
+  sample.ends_at = to;
+  held_.push_back(sample);
+  filter_->Hold(sample);
+}
+
+// It was no rest: what was held is integrated after all.
+void RailFilter::IntegrateHeld() {
+  filter_.emplace(*before_held_);
+  for (const ImuSample& sample : held_) filter_->Feed(sample);
+  filter_->BringForward();
+}
+
+// Whether the unit rests now. Tried before anything is remembered of this epoch.
+bool RailFilter::TakeRest() {
+  if (in_gap_ || !SaysRest(filter_->now())) return false;
+  FusionFilter tried = *filter_;
+  const FusionVerdict verdict = UpdateByRest(tried, {});
+  if (verdict.accepted) return true;
+  Count(verdict);
+  if (!held_.empty()) IntegrateHeld();
+  return false;
+}
+
 void RailFilter::EndEpoch() {
-  const Timestamp now = filter_.now();
+  const Timestamp now = filter_->now();
   last_epoch_ = now;
-  filter_.BringForward();
-  if (smoother_ != nullptr) smoother_->Before(filter_);
-  const Eigen::Vector3d before_m = filter_.state().motion.position_world_m;
-  rests_now_ = false;
-  if (SaysRest(now)) {
-    const FusionVerdict verdict = UpdateByRest(filter_, {});
-    Count(verdict);
-    rests_now_ = verdict.accepted;
+  filter_->BringForward();
+  rests_now_ = TakeRest();
+  held_.clear();
+  if (smoother_ != nullptr) smoother_->Before(*filter_);
+  arrived_ = filter_->state().motion;
+  if (rests_now_) {
+    Count(UpdateByRest(*filter_, {}));
+    if (IsHeld(now)) fixes_.push_back(now);
   }
-  if (rests_now_) fixes_.push_back(now);
   for (; !tilts_.empty() && tilts_.front().sensed_at <= now; tilts_.pop_front()) {
     const TrolleyTilt& tilt = tilts_.front();
     if (!setup_.tilt) continue;
@@ -199,7 +241,7 @@ void RailFilter::EndEpoch() {
       Outside(tilt.sensed_at, FusionUpdate::kTilt);
       continue;
     }
-    Count(UpdateByTilt(filter_, *setup_.tilt, tilt.angles, rests_now_));
+    Count(UpdateByTilt(*filter_, *setup_.tilt, tilt.angles, rests_now_));
   }
   for (; !images_.empty() && images_.front().stamped_at <= now; images_.pop_front()) {
     TakeImage(images_.front());
@@ -207,16 +249,17 @@ void RailFilter::EndEpoch() {
   for (; !wheels_.empty() && wheels_.front().Middle() <= now; wheels_.pop_front()) {
     TakeWheel(wheels_.front());
   }
-  TakeGrounds(filter_.state().motion.position_world_m - before_m);
-  if (smoother_ != nullptr) smoother_->After(filter_);
+  CorrectGroundFrom();
+  TakeGrounds();
+  if (smoother_ != nullptr) smoother_->After(*filter_);
 }
 
 void RailFilter::TakeImage(const TargetImage& image) {
   if (!setup_.camera) return;
-  const Timestamp now = filter_.now();
+  const Timestamp now = filter_->now();
   if (image.stamped_at < now) return Outside(image.stamped_at, FusionUpdate::kTargets);
   const TargetsVerdict outcome = UpdateByTargets(
-      filter_, setup_.camera->model, setup_.camera->residual_px, targets_, image.pixels);
+      *filter_, setup_.camera->model, setup_.camera->residual_px, targets_, image.pixels);
   Count(outcome.verdict);
   for (const RejectedPixel& rejected : outcome.rejected) {
     rejections_.push_back({now,
@@ -229,31 +272,45 @@ void RailFilter::TakeImage(const TargetImage& image) {
 void RailFilter::TakeWheel(const OdometerSpan& span) {
   if (!setup_.odometer) return;
   const Timestamp at = span.Middle();
-  if (at < filter_.now()) return Outside(at, FusionUpdate::kOdometer);
+  if (at < filter_->now()) return Outside(at, FusionUpdate::kOdometer);
   const double span_s = SecondsBetween(span.from.sensed_at, span.to.sensed_at);
   OdometerMounting mounting = setup_.odometer->mounting;
-  mounting.sigma_m_s = std::sqrt(2.0) * setup_.odometer->sigma_m / span_s;
-  Count(UpdateByOdometer(filter_, mounting, (span.to.distance_m - span.from.distance_m) / span_s));
+  mounting.sigma_m_s = std::hypot(std::sqrt(2.0) * setup_.odometer->sigma_m / span_s,
+                                  0.125 * kMostChange_m_s2 * span_s);
+  Count(UpdateByOdometer(*filter_, mounting, (span.to.distance_m - span.from.distance_m) / span_s));
 }
 
-// `corrected_m`: by what else was measured at this epoch.
-void RailFilter::TakeGrounds(const Eigen::Vector3d& corrected_m) {
-  const Timestamp now = filter_.now();
-  // The place where the images began was wrong by the same.
-  if (ground_from_) ground_from_->position_world_m += corrected_m;
-  while (setup_.ground && !grounds_.empty()) {
+// What corrects the unit now corrects where the first image was taken: the same error, brought back
+// by the time since.
+void RailFilter::CorrectGroundFrom() {
+  if (!ground_from_) return;
+  const Motion& before = arrived_;
+  const Motion& after = filter_->state().motion;
+  const double since_s = SecondsBetween(ground_from_at_, filter_->now());
+  ground_from_->position_world_m +=
+      after.position_world_m - before.position_world_m -
+      since_s * (after.velocity_world_m_s - before.velocity_world_m_s);
+  ground_from_->world_from_imu =
+      (after.world_from_imu * before.world_from_imu.conjugate() * ground_from_->world_from_imu)
+          .normalized();
+}
+
+void RailFilter::TakeGrounds() {
+  const Timestamp now = filter_->now();
+  while (!grounds_.empty()) {
     const GroundDisplacement& ground = grounds_.front();
     if (!ground_from_) {
       if (ground.from > now) return;
       if (ground.from == now) {
-        ground_from_ = filter_.state().motion;
+        ground_from_ = filter_->state().motion;
+        ground_from_at_ = now;
         return;
       }
       Outside(ground.to, FusionUpdate::kImageDisplacement);
     } else {
       if (ground.to > now) return;
       Count(UpdateByImageDisplacement(
-          filter_,
+          *filter_,
           GroundVehicle(*setup_.ground),
           *ground_from_,
           {ground.told_m, SecondsBetween(ground.from, ground.to), ground.sigma_m}));

@@ -9,6 +9,7 @@
 
 #include "guidance/fusion/fusion_filter.h"
 #include "guidance/fusion/fusion_smoother.h"
+#include "guidance/rail/quiet_watch.h"
 #include "guidance/rail/rail_recording.h"
 #include "guidance/rail/rail_start.h"
 
@@ -61,9 +62,6 @@ inline Timestamp BeginOfRun(const ImuSample& first) {
   return first.ends_at - Duration(std::llround(first.interval_s * 1e9));
 }
 
-// How long samples were missing before this one; 0 when none were.
-double GapBefore(const RailSetup& setup, Timestamp last, const ImuSample& sample);
-
 // Integrates a sample up to `to` from where the filter stands; where it stands for missing ones,
 // with what may have happened in `gap_s`.
 void FeedUpTo(
@@ -86,7 +84,10 @@ class RailFilter {
   void Add(const TrolleyTilt& tilt) { tilts_.push_back(tilt); }
   void Add(const TargetImage& image) { images_.push_back(image); }
   void Add(const OdometerSpan& span) { wheels_.push_back(span); }
-  void Add(const GroundDisplacement& ground) { grounds_.push_back(ground); }
+  // Without a camera for them in the set-up they are of no use.
+  void Add(const GroundDisplacement& ground) {
+    if (setup_.ground) grounds_.push_back(ground);
+  }
 
   // The next sample, in the order of time.
   void Feed(const ImuSample& sample);
@@ -94,14 +95,17 @@ class RailFilter {
   // After the last sample: what is left is of no use.
   void Finish();
 
-  const FusionFilter& filter() const { return filter_; }
+  const FusionFilter& filter() const { return *filter_; }
   // Where the covariance was brought to and measurements were taken.
   std::optional<Timestamp> last_epoch() const { return last_epoch_; }
   bool rests() const { return rests_now_; }  // since the last epoch
+  // Where the unit had come to at the last epoch, before anything was measured there.
+  const Motion& arrived() const { return arrived_; }
 
   // Spans without samples, in the order of time.
   const std::vector<RestSpan>& gaps() const { return gaps_; }
-  // When the position was held by something outside of the unit, in the order of time.
+  // When the position was held by something outside of the unit, in the order of time: by targets,
+  // and by rest at a place that was held when the rest began.
   const std::vector<Timestamp>& fixes() const { return fixes_; }
   const std::array<RailConsistency, kFusionUpdates>& consistency() const { return consistency_; }
   // Since they were taken last.
@@ -111,10 +115,15 @@ class RailFilter {
   Timestamp NextStamp() const;
   void Advance(const ImuSample& sample, Timestamp to);
   bool SaysRest(Timestamp at) const;
+  bool IsHeld(Timestamp at) const;
+  void Hold(ImuSample sample, Timestamp to);
+  void IntegrateHeld();
+  bool TakeRest();
   void EndEpoch();
   void TakeImage(const TargetImage& image);
   void TakeWheel(const OdometerSpan& span);
-  void TakeGrounds(const Eigen::Vector3d& corrected_m);
+  void CorrectGroundFrom();
+  void TakeGrounds();
   void Outside(Timestamp at, FusionUpdate update);
   void Count(const FusionVerdict& verdict);
 
@@ -122,16 +131,22 @@ class RailFilter {
   const std::vector<SurveyedTarget>& targets_;
   const std::vector<RestSpan>& rests_;
   const Timestamp begin_;
-  FusionFilter filter_;
+  std::optional<FusionFilter> filter_;  // always there; an optional can be set back
+  std::vector<ImuSample> held_;         // since the last epoch, as rest; that may still prove wrong
+  std::optional<FusionFilter> before_held_;
   FusionSmoother* const smoother_;
   std::optional<Timestamp> last_epoch_;
   bool rests_now_ = false;
+  Motion arrived_;
   double gap_s_ = 0.0;             // that the present sample stands for; 0: it is one like all
+  bool in_gap_ = false;            // the filter stands where no samples told how it came there
   std::deque<TrolleyTilt> tilts_;  // not taken yet
   std::deque<TargetImage> images_;
   std::deque<OdometerSpan> wheels_;
   std::deque<GroundDisplacement> grounds_;
-  std::optional<Motion> ground_from_;  // where the first of them began, once that is past
+  // Where the first of them began, once that is past, and when.
+  std::optional<Motion> ground_from_;
+  Timestamp ground_from_at_;
   std::vector<RestSpan> gaps_;
   std::vector<Timestamp> fixes_;
   std::array<RailConsistency, kFusionUpdates> consistency_;

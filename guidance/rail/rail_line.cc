@@ -15,6 +15,7 @@ namespace {
 
 // The state is no better for it than it was.
 constexpr double kToldNothing = 0.9;
+constexpr std::string_view kStretch = "a stretch between targets, or between places that are known";
 
 // Filters a recording once, from its first sample to its last.
 class Run {
@@ -208,16 +209,17 @@ void FillEstimates(const FusionEpoch& last, const RailPrior& prior, RailLine* li
     }
   }
   if (layout.Has(FusionOption::kOdometerScale)) {
-    add("odometer_scale",
-        layout.At(FusionOption::kOdometerScale),
-        state.odometer_scale,
-        "a stretch between targets, or between places that are known");
+    add("odometer_scale", layout.At(FusionOption::kOdometerScale), state.odometer_scale, kStretch);
+    for (int i = 0; i < 2; ++i) {
+      add(std::string("odometer_turn_") + kAxes[static_cast<std::size_t>(i + 1)] + "_rad",
+          layout.At(FusionOption::kOdometerTurn) + i,
+          state.odometer_turn_rad[i],
+          kStretch);
+    }
   }
   if (layout.Has(FusionOption::kImageScale)) {
-    add("ground_height_scale",
-        layout.At(FusionOption::kImageScale),
-        state.image_scale,
-        "a stretch between targets, or between places that are known");
+    add("ground_height_scale", layout.At(FusionOption::kImageScale), state.image_scale, kStretch);
+    add("ground_turn_z_rad", layout.At(FusionOption::kImageTurn), state.image_turn_rad, kStretch);
   }
 }
 

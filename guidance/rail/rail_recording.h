@@ -37,15 +37,17 @@ struct RailOdometer {
   OdometerMounting mounting;  // its sigma_m_s follows from `sigma_m` and the time between readings
   double sigma_m = 0.0;       // of one reading, > 0
   double sigma_scale = 0.0;   // of true distance over told distance
+  double sigma_rotation_rad = 0.0;  // of vehicle_from_imu, about the vehicle's y and z
 };
 // Looks at the ground beside the rail.
 struct RailGroundCamera {
   CameraModel model;
   Eigen::Quaterniond camera_from_imu = Eigen::Quaterniond::Identity();
   Eigen::Vector3d in_imu_m = Eigen::Vector3d::Zero();
-  double height_m = 0.0;        // over the ground, > 0
-  double sigma_height_m = 0.0;  // of it, > 0; the same along the whole run
-  double sigma_m = 0.0;         // of a displacement, beside what its images say
+  double sigma_rotation_rad = 0.0;  // of camera_from_imu, about the plumb line
+  double height_m = 0.0;            // over the ground, > 0
+  double sigma_height_m = 0.0;      // of it, > 0; the same along the whole run
+  double sigma_m = 0.0;             // of a displacement, beside what its images say
 };
 struct RailStart {
   Eigen::Vector3d position_world_m = Eigen::Vector3d::Zero();  // of the unit

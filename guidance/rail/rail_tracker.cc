@@ -120,25 +120,23 @@ void RailTracker::Follow(const ImuSample& sample) {
 
 // As along a finished line: between epochs, and not at all where the trolley stands.
 void RailTracker::AddDistance() {
-  const Eigen::Vector3d& here_m = filter_->filter().state().motion.position_world_m;
   const Timestamp epoch = *filter_->last_epoch();
   if (last_epoch_) {
-    const double chord_m = (here_m - at_last_epoch_m_).norm();
+    // What is corrected at an epoch was not run.
+    const double chord_m = (filter_->arrived().position_world_m - at_last_epoch_m_).norm();
     if (chord_m > kStill_m_s * SecondsBetween(*last_epoch_, epoch)) distance_m_ += chord_m;
   }
-  at_last_epoch_m_ = here_m;
+  at_last_epoch_m_ = filter_->filter().state().motion.position_world_m;
   last_epoch_ = epoch;
 }
 
-// As the filter has it, a lag behind: what came since may be on its way.
-TrolleyHold RailTracker::Hold() const {
+TrolleyHold RailTracker::HoldAt(Timestamp at) const {
   const std::vector<Timestamp>& fixes = filter_->fixes();
   const std::vector<RestSpan>& gaps = filter_->gaps();
   if (!gaps.empty() && (fixes.empty() || fixes.back() < gaps.back().ends_at)) {
     return TrolleyHold::kGap;
   }
-  const bool is_held =
-      !fixes.empty() && SecondsBetween(fixes.back(), filter_->filter().now()) <= kHeld_s;
+  const bool is_held = !fixes.empty() && SecondsBetween(fixes.back(), at) <= kHeld_s;
   return is_held ? TrolleyHold::kFixed : TrolleyHold::kOpen;
 }
 
@@ -146,7 +144,7 @@ std::optional<TrolleyPlace> RailTracker::Place() const {
   if (phase_ != RailTrackerPhase::kTracks || !filter_->last_epoch()) return {};
   FusionFilter ahead = filter_->filter();
   TrolleyPlace place;
-  place.hold = Hold();
+  place.hold = HoldAt(samples_.empty() ? ahead.now() : samples_.back().ends_at);
   for (const ImuSample& sample : samples_) {
     const double gap_s = GapBefore(setup_, ahead.now(), sample);
     if (gap_s > 0.0) place.hold = TrolleyHold::kGap;

@@ -91,7 +91,7 @@ class RailTracker {
   void Step();
   void Follow(const ImuSample& sample);
   void AddDistance();
-  TrolleyHold Hold() const;
+  TrolleyHold HoldAt(Timestamp at) const;
 
   const RailSetup setup_;
   const std::vector<SurveyedTarget> targets_;

@@ -275,6 +275,7 @@ TEST(RailLine, AWheelHoldsWhatTheUnitBridges) {
     RailOdometer wheel;
     wheel.sigma_m = 2e-4;
     wheel.sigma_scale = 0.01;
+    wheel.sigma_rotation_rad = DegToRad(0.05);
     wheel.mounting.sigma_side_m_s = 0.1;
     run.setup.odometer = wheel;
     const auto with = SolveRailLine(run.setup, run.recording, RailMethod::kSmoothed);
@@ -536,11 +537,14 @@ TEST_F(LineCommand, FaultsNameFileLineAndColumn) {
   EXPECT_THAT(with("rate_hz: 200", "rate_hz: -1"), HasSubstr("rail.yaml:2: imu.rate_hz"));
   EXPECT_THAT(with("at_rest_s: 9.5", "at_rest_s: 13"), HasSubstr("the trolley moves"));
   EXPECT_THAT(with("at_rest_s: 9.5", "at_rest_s: 1"), HasSubstr("start.at_rest_s"));
+  EXPECT_THAT(with(" sigma_position_mm: 0.1,", ""), HasSubstr("start.sigma_position_mm"));
   EXPECT_THAT(with(" heading_deg: -90,", ""), HasSubstr("there is no heading_deg"));
   EXPECT_THAT(with(" sigma_heading_deg: 0.05,", ""), HasSubstr("there is no sigma_heading_deg"));
   EXPECT_THAT(with("start:", "odometer: {position_m: [0, 0, 0], sigma_mm: 0}\nstart:"),
               testing::AllOf(HasSubstr("rail.yaml:3: odometer.rotation"),
                              HasSubstr("odometer.sigma_mm"),
+                             HasSubstr("odometer.sigma_scale_ppm"),
+                             HasSubstr("odometer.sigma_rotation_deg"),
                              HasSubstr("odometer.sigma_side_mm_s")));
   EXPECT_THAT(with("accel_bias_mg", "accel_bias_ug"), HasSubstr("accel_bias_ug"));
   EXPECT_THAT(with("gravity_m_s2: 9.80665", "gravity_m_s2: 981"), HasSubstr("gravity_m_s2"));
@@ -560,8 +564,10 @@ TEST_F(LineCommand, FaultsNameFileLineAndColumn) {
 TEST_F(LineCommand, WhatIsNotUsedIsTold) {
   WriteText(folder_ / "tilt.csv", "stamp_ns,sensor,beta_deg,gamma_deg\n1,trolley,0,0\n");
   WriteText(folder_ / "odometer.csv", "stamp_ns,distance_m\n1,0\n2,0.5\n");
+  WriteText(folder_ / "displacement.csv",
+            "from_ns,to_ns,dx_m,dy_m,sigma_m\n1790000000100000000,1790000000200000000,0,0,0.001\n");
   ASSERT_EQ(Run(), ExitCode::kDone) << err_.str();
-  for (const char* file : {"tilt.csv", "odometer.csv"}) {
+  for (const char* file : {"tilt.csv", "odometer.csv", "displacement.csv"}) {
     EXPECT_THAT(err_.str(), HasSubstr(std::string(file) + ": is not used")) << file;
   }
 }

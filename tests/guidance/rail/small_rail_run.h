@@ -29,9 +29,10 @@ inline RailRunTexts SmallRailRun() {
       "  sigma_rotation_deg: 0.05\n  sigma_position_mm: 1\n  time_offset_s: 0\n"
       "  sigma_time_offset_s: 0.002\n"
       "odometer: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], position_m: [0, 0, 0], sigma_mm: 1, "
-      "sigma_scale_ppm: 1000, sigma_side_mm_s: 5}\nground_camera:\n" +
+      "sigma_scale_ppm: 1000, sigma_rotation_deg: 0.1, sigma_side_mm_s: 5}\nground_camera:\n" +
       lens +
       "  rotation: [0, -1, 0, -1, 0, 0, 0, 0, -1]\n  position_m: [0, 0, 0]\n  height_m: 0.5\n"
+      "  sigma_rotation_deg: 0.1\n"
       "  sigma_height_mm: 5\n"
       "start: {position_m: [0, 0, 0], sigma_position_mm: 1, heading_known: true, heading_deg: 0, "
       "sigma_heading_deg: 0.5, at_rest_s: 3}\n";

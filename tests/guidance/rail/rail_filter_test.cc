@@ -1,0 +1,311 @@
+#include "guidance/rail/rail_filter.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include <gtest/gtest.h>
+
+#include "guidance/rail/rail_line.h"
+#include "guidance/rail_study/rail_scene.h"
+#include "pose/base/angle.h"
+#include "pose/geometry/rigid3.h"
+#include "tests/support/random.h"
+
+namespace tbm {
+namespace {
+
+using test::Random;
+
+// A trolley that runs straight on along the world's x and stops again, by the unit's axes. Nothing
+// but the unit and its inclinometer, and the heading that somebody has given.
+struct StraightRun {
+  RailSetup setup;
+  RailRecording recording;
+  std::vector<RailTruth> truth;
+};
+
+struct StraightScene {
+  double rest_s = 6.0;
+  double run_s = 20.0;  // 0.15 m/s2 for two seconds at either end of it, evenly in between
+  double end_rest_s = 3.0;
+};
+
+StraightRun RunStraight(const StraightScene& scene, Random& random) {
+  constexpr double kRate_hz = 100.0;
+  constexpr double kForce_m_s2 = 0.15;
+  StraightRun run;
+  RailSetup& setup = run.setup;
+  setup.imu.rate_hz = kRate_hz;
+  setup.imu.noise.angle_random_walk_rad = DegToRad(0.1) / 60.0;
+  setup.imu.noise.velocity_random_walk_m_s = 3e-4;
+  setup.imu.gyro_bias_sigma_rad_s = 1e-4;
+  setup.imu.accel_bias_sigma_m_s2 = 5e-3;
+  setup.tilt = TiltMounting{Eigen::Quaterniond::Identity(), DegToRad(0.003)};
+  setup.start.sigma_position_m = 1e-4;
+  setup.start.at_rest_s = scene.rest_s;
+  setup.start.sigma_heading_rad = DegToRad(0.02);
+  const double yaw_rad = random.Normal(setup.start.sigma_heading_rad);
+  setup.start.heading_rad = yaw_rad;
+  const Eigen::Vector3d gyro_bias = random.Normal3(setup.imu.gyro_bias_sigma_rad_s);
+  const Eigen::Vector3d accel_bias = random.Normal3(setup.imu.accel_bias_sigma_m_s2);
+  const double gyro_sigma = setup.imu.noise.angle_random_walk_rad * std::sqrt(kRate_hz);
+  const double accel_sigma = setup.imu.noise.velocity_random_walk_m_s * std::sqrt(kRate_hz);
+  const auto samples = static_cast<int>(kRate_hz * (scene.rest_s + scene.run_s + scene.end_rest_s));
+  double x_m = 0.0;
+  double speed_m_s = 0.0;
+  for (int i = 1; i <= samples; ++i) {
+    const double runs_s = (i - 0.5) / kRate_hz - scene.rest_s;
+    double force = 0.0;
+    if (runs_s > 0.0 && runs_s < 2.0) force = kForce_m_s2;
+    if (runs_s > scene.run_s - 2.0 && runs_s < scene.run_s) force = -kForce_m_s2;
+    x_m += speed_m_s / kRate_hz + 0.5 * force / (kRate_hz * kRate_hz);
+    speed_m_s += force / kRate_hz;
+    const Timestamp at{1'790'000'000'000'000'000 + 10'000'000L * i};
+    ImuSample sample;
+    sample.ends_at = at;
+    sample.interval_s = 1.0 / kRate_hz;
+    sample.gyro_rad_s = gyro_bias + random.Normal3(gyro_sigma);
+    sample.accel_m_s2 =
+        Eigen::Vector3d(force, 0.0, setup.gravity_m_s2) + accel_bias + random.Normal3(accel_sigma);
+    run.recording.imu.push_back(sample);
+    run.truth.push_back({at, {x_m, 0.0, 0.0}, Eigen::Quaterniond::Identity()});
+    if (i % 10 == 0) {
+      run.recording.tilts.push_back(
+          {at,
+           {random.Normal(setup.tilt->sigma_rad) - force / setup.gravity_m_s2,
+            random.Normal(setup.tilt->sigma_rad)}});
+    }
+  }
+  return run;
+}
+
+const RailPoint& PointAt(const RailLine& line, Timestamp at) {
+  const auto point = std::lower_bound(
+      line.points.begin(), line.points.end(), at, [](const RailPoint& p, Timestamp stamp) {
+        return p.at < stamp;
+      });
+  EXPECT_NE(point, line.points.end());
+  return *point;
+}
+
+double Squared(const RailPoint& point, const RailTruth& truth) {
+  return (point.position_world_m - truth.position_world_m)
+      .cwiseQuotient(point.sigma_world_m)
+      .squaredNorm();
+}
+
+// Not even a trolley that rests before and behind stays where it is while nothing is told.
+TEST(RailFilter, WhatIsMovedWhileSamplesAreMissingAtRestIsNoRest) {
+  double squared = 0.0;
+  constexpr int kRuns = 12;
+  for (int seed = 0; seed < kRuns; ++seed) {
+    Random random("moved at rest", static_cast<std::uint64_t>(seed));
+    StraightRun run = RunStraight({.rest_s = 6.0, .run_s = 8.0, .end_rest_s = 12.0}, random);
+    const Timestamp begin = run.recording.imu.front().ends_at;
+    const Eigen::Vector3d moved_m = random.Normal3(0.2);
+    std::erase_if(run.recording.imu, [&](const ImuSample& sample) {
+      const double t = SecondsBetween(begin, sample.ends_at);
+      return t > 18.0 && t < 20.0;
+    });
+    for (RailTruth& row : run.truth) {
+      if (SecondsBetween(begin, row.at) >= 20.0) row.position_world_m += moved_m;
+    }
+    for (const RailMethod method : {RailMethod::kFilter, RailMethod::kSmoothed}) {
+      const auto line = SolveRailLine(run.setup, run.recording, method);
+      ASSERT_TRUE(line);
+      const RailPoint& last = line->points.back();
+      EXPECT_EQ(last.status, RailStatus::kOpen);
+      EXPECT_GT(last.sigma_world_m.minCoeff(), 0.2);
+      EXPECT_LT(last.sigma_world_m.maxCoeff(), 2.0);
+      squared += Squared(last, run.truth.back()) / (6.0 * kRuns);
+    }
+  }
+  std::printf("error over sigma %.2f\n", std::sqrt(squared));
+  EXPECT_LT(std::sqrt(squared), 1.3);
+}
+
+// Somebody has written down a rest that is longer than it was.
+TEST(RailFilter, MotionThatWasTakenForRestIsIntegratedAfterAll) {
+  for (const double too_long_s : {0.0, 0.04, 0.1, 0.15, 0.23}) {
+    SCOPED_TRACE(too_long_s);
+    double squared = 0.0;
+    constexpr int kRuns = 8;
+    for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+      GeneratedRun run = GenerateRail({.seed = seed, .rest_s = 9.5});
+      run.setup.start.at_rest_s = 9.5 + too_long_s;
+      const auto line = SolveRailLine(run.setup, run.recording, RailMethod::kSmoothed);
+      if (!line) {
+        EXPECT_EQ(line.error().fault, RailStartFault::kMovesAtStart);
+        continue;
+      }
+      const auto& images = line->consistency[static_cast<std::size_t>(FusionUpdate::kTargets)];
+      EXPECT_EQ(images.accepted, images.given);
+      const std::size_t at = 2050;  // a quarter of a second after it has left
+      squared += Squared(line->points[at], run.truth[at]) / (3.0 * kRuns);
+      EXPECT_EQ(line->points[at].at, run.truth[at].at);
+    }
+    EXPECT_LT(std::sqrt(squared), 1.6);
+  }
+}
+
+TEST(RailFilter, RestHoldsAPlaceButFindsNone) {
+  GeneratedRun run = GenerateRail({.seed = 12, .end_rest_s = 8.0});
+  const Timestamp begin = run.recording.imu.front().ends_at;
+  const double end_s = SecondsBetween(begin, run.recording.imu.back().ends_at);
+  // From the middle of the way on it sees nothing.
+  std::erase_if(run.recording.images, [&](const TargetImage& image) {
+    return SecondsBetween(begin, image.stamped_at) > 14.0;
+  });
+  const auto open = SolveRailLine(run.setup, run.recording, RailMethod::kSmoothed);
+  ASSERT_TRUE(open);
+  EXPECT_EQ(open->points.back().status, RailStatus::kOpen);
+  EXPECT_GT(open->consistency[static_cast<std::size_t>(FusionUpdate::kRest)].accepted, 150u);
+
+  // It sees the last of them when it has stopped: from there on rest holds what they have said.
+  GeneratedRun seen = GenerateRail({.seed = 12, .end_rest_s = 8.0});
+  std::erase_if(seen.recording.images, [&](const TargetImage& image) {
+    return SecondsBetween(begin, image.stamped_at) > end_s - 6.0;
+  });
+  const auto held = SolveRailLine(seen.setup, seen.recording, RailMethod::kFilter);
+  ASSERT_TRUE(held);
+  EXPECT_EQ(held->points.back().status, RailStatus::kFixed);
+}
+
+struct AskewTally {
+  double line = 0.0;  // mean squares over sigma
+  double turn = 0.0;
+  double turn_sigma_rad = 0.0;
+};
+
+// A wheel that tells its way while it is built in askew to the unit by what rail.yaml says.
+AskewTally WithAskewWheel(double askew_sigma_rad, int runs) {
+  AskewTally tally;
+  for (int seed = 0; seed < runs; ++seed) {
+    Random random("askew wheel", static_cast<std::uint64_t>(seed));
+    StraightRun run = RunStraight({.run_s = 40.0}, random);
+    RailOdometer wheel;
+    wheel.sigma_m = 3e-4;
+    wheel.sigma_scale = 1e-3;
+    wheel.sigma_rotation_rad = askew_sigma_rad;
+    wheel.mounting.sigma_side_m_s = 2e-3;
+    const Eigen::Vector3d askew_rad(
+        0.0, random.Normal(askew_sigma_rad), random.Normal(askew_sigma_rad));
+    wheel.mounting.vehicle_from_imu = ExpRotation(-askew_rad);
+    run.setup.odometer = wheel;
+    const double scale = random.Normal(wheel.sigma_scale);
+    for (std::size_t i = 9; i < run.truth.size(); i += 10) {
+      run.recording.odometer.push_back(
+          {run.truth[i].at,
+           run.truth[i].position_world_m.x() / (1.0 + scale) + random.Normal(wheel.sigma_m)});
+    }
+    const auto line = SolveRailLine(run.setup, run.recording, RailMethod::kSmoothed);
+    EXPECT_TRUE(line);
+    if (!line) continue;
+    tally.line += Squared(line->points.back(), run.truth.back()) / (3.0 * runs);
+    for (const RailEstimate& estimate : line->estimates) {
+      const int axis = estimate.what == "odometer_turn_y_rad"   ? 1
+                       : estimate.what == "odometer_turn_z_rad" ? 2
+                                                                : 0;
+      if (axis == 0) continue;
+      tally.turn += std::pow((estimate.value - askew_rad[axis]) / estimate.sigma, 2) / (2.0 * runs);
+      tally.turn_sigma_rad = std::max(tally.turn_sigma_rad, estimate.sigma);
+    }
+  }
+  return tally;
+}
+
+TEST(RailFilter, AWheelThatIsBuiltInAskewIsAsGoodAsItSays) {
+  const AskewTally tally = WithAskewWheel(DegToRad(0.2), 24);
+  std::printf("error over sigma: line %.2f, turn %.2f; turn found within %.4f deg\n",
+              std::sqrt(tally.line),
+              std::sqrt(tally.turn),
+              RadToDeg(tally.turn_sigma_rad));
+  // Chi-squared with 72 and 48 degrees of freedom, 99.9 %.
+  EXPECT_GT(tally.line, 0.52);
+  EXPECT_LT(tally.line, 1.6);
+  EXPECT_GT(tally.turn, 0.45);
+  EXPECT_LT(tally.turn, 1.8);
+}
+
+// Displacements of the ground that begin and end between images of targets.
+TEST(RailFilter, ImagesOfTargetsAndOfTheGroundTakeTurns) {
+  RailConsistency grounds;
+  double squared = 0.0;
+  constexpr int kRuns = 6;
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+    GeneratedRun run = GenerateRail({.seed = seed, .turns_deg = 3.0});
+    Random random("ground between targets", seed);
+    // One image in five is left, so that each has something to correct.
+    std::size_t count = 0;
+    std::erase_if(run.recording.images, [&](const TargetImage&) { return count++ % 5 != 0; });
+    RailGroundCamera camera;
+    camera.camera_from_imu = TurnBetween(-Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitZ());
+    camera.height_m = 0.5;
+    camera.sigma_height_m = 1e-3;
+    camera.sigma_rotation_rad = DegToRad(0.05);
+    run.setup.ground = camera;
+    const double scale = 1.0 + random.Normal(camera.sigma_height_m / camera.height_m);
+    const Eigen::Quaterniond vehicle =
+        ExpRotation({0.0, 0.0, random.Normal(camera.sigma_rotation_rad)}) * GroundVehicle(camera);
+    constexpr double kSigma_m = 5e-5;
+    for (std::size_t i = 2007; i + 40 < run.truth.size(); i += 40) {
+      const RailTruth& from = run.truth[i];
+      const RailTruth& to = run.truth[i + 40];
+      const Eigen::Vector3d way_m = vehicle * (from.world_from_imu.conjugate() *
+                                               (to.position_world_m - from.position_world_m));
+      run.recording.grounds.push_back({from.at,
+                                       to.at,
+                                       Eigen::Vector2d(way_m.x() / scale + random.Normal(kSigma_m),
+                                                       way_m.y() / scale + random.Normal(kSigma_m)),
+                                       kSigma_m});
+    }
+    const auto line = SolveRailLine(run.setup, run.recording, RailMethod::kFilter);
+    ASSERT_TRUE(line);
+    const RailConsistency& kind =
+        line->consistency[static_cast<std::size_t>(FusionUpdate::kImageDisplacement)];
+    grounds.given += kind.given;
+    grounds.accepted += kind.accepted;
+    grounds.nis += kind.nis;
+    grounds.dof += kind.dof;
+    for (std::size_t i = 2000; i < run.truth.size(); i += 10) {
+      squared += Squared(line->points[i], run.truth[i]) /
+                 (3.0 * kRuns * static_cast<double>((run.truth.size() - 2000) / 10));
+    }
+  }
+  std::printf("%zu of %zu displacements, NIS / dof %.3f; error over sigma %.2f\n",
+              grounds.accepted,
+              grounds.given,
+              grounds.nis / grounds.dof,
+              std::sqrt(squared));
+  EXPECT_EQ(grounds.accepted, grounds.given);
+  EXPECT_GT(grounds.nis / grounds.dof, 0.85);
+  EXPECT_LT(grounds.nis / grounds.dof, 1.15);
+  EXPECT_LT(std::sqrt(squared), 1.4);
+}
+
+// A point that its finder is not sure of is not believed more than that.
+TEST(RailFilter, APointCountsAsItsFinderSays) {
+  GeneratedRun run = GenerateRail({.seed = 15});
+  const auto with = [&](double sigma_px) {
+    GeneratedRun spoilt = run;
+    for (TargetImage& image : spoilt.recording.images) {
+      for (TargetPixel& pixel : image.pixels) {
+        if (pixel.target % 2 != 0) continue;
+        pixel.pixel_px.x() += 0.3;
+        pixel.sigma_px = sigma_px;
+      }
+    }
+    const auto line = SolveRailLine(spoilt.setup, spoilt.recording, RailMethod::kSmoothed);
+    EXPECT_TRUE(line);
+    double largest_m = 0.0;
+    for (std::size_t i = 0; i < run.truth.size(); ++i) {
+      largest_m = std::max(
+          largest_m, (line->points[i].position_world_m - run.truth[i].position_world_m).norm());
+    }
+    return largest_m;
+  };
+  EXPECT_LT(with(20.0), 0.7 * with(0.0));
+}
+
+}  // namespace
+}  // namespace tbm
