@@ -174,6 +174,30 @@ test('camera silent: its picture and device say so, the rest goes on', () => Wit
   await Quality(page, 'ok');
 }));
 
+test('the trolley: its place with what holds it, by the unit alone, silent, and none', () => With({route: 'trolley', allows: LOGGED_OUT}, async ({page}) => {
+  const place = '[data-id=trolley_y]';
+  const has = (what) => page.waitForFunction((text) => document.querySelector('.page-trolley').textContent.includes(text), what, {timeout: 3000});
+  await page.waitForSelector(`${place}[data-quality=ok]`);
+  Check((await page.textContent(place)).includes('12.8871'), await page.textContent(place));
+  await has('No alert size is exceeded');
+  await page.click(place);
+  Check((await page.textContent('dialog')).includes('0.34 mm'), await page.textContent('dialog'));
+  await page.click('dialog .close');
+  SCENES.trolley_open(bridge);
+  await page.waitForSelector(`${place}[data-quality=degraded]`);
+  await has('by the inertial unit alone');
+  await has('Alert size 2 is exceeded');
+  bridge.held.add('trolley');
+  await page.waitForSelector(`${place}[data-quality=stale]`, {timeout: 2000});
+  Check(!(await page.textContent('.page-trolley tbody')).includes('8.40'), 'the sigma of a stale place is shown');
+  bridge.held.delete('trolley');
+  SCENES.trolley_none(bridge);
+  await page.waitForSelector(`${place}[data-quality=missing]`);
+  await has('rest at the start is not over');
+  bridge.set((s) => Object.assign(s.trolley, {state: null}));
+  await has('MISSING');
+}));
+
 test('the bridge falls silent: told within two seconds, and it comes back by itself', () => With({allows: [...AWAY, ...LOGGED_OUT]}, async ({page}) => {
   SCENES.alarms(bridge);
   await Until(page, 'alarms', () => document.querySelector('.banner')?.dataset.urgency === 'high');
@@ -389,7 +413,7 @@ test('accessible, and large enough to touch: all pages, day and night, all langu
     await page.evaluate(([a, b]) => localStorage.setItem('tbm.console.settings', JSON.stringify({language: a, theme: b})), [language, theme]);
     await page.reload();
     await Connection(page, 'live');
-    for (const [route, scene] of [['drive', 'coasting'], ['drive', 'stale'], ['alarms', 'alarms'], ['events', 'ok'], ['camera', 'degraded'], ['station', 'move'], ['reports', 'ok'], ['settings', 'ok']]) {
+    for (const [route, scene] of [['drive', 'coasting'], ['drive', 'stale'], ['alarms', 'alarms'], ['events', 'ok'], ['camera', 'degraded'], ['station', 'move'], ['trolley', 'trolley_open'], ['reports', 'ok'], ['settings', 'ok']]) {
       if (language !== 'en' && scene === 'stale') continue;
       bridge.reset();
       SCENES[scene](bridge);

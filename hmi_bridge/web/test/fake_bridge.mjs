@@ -88,6 +88,10 @@ export class FakeBridge {
         {source: 'camera', code: 'device_state', at_utc_ms: utc - 100000, severity: 'info', active: false, text: 'camera is streaming'}],
       commands: [],
       reports: [],
+      trolley: {
+        state: {timing: this.timing(400), run: 'rail_20261123_101500', status: 'fixed', reason: '', position_world_m: [1.2342, 12.8871, 1.1998], position_sigma_mm: [0.21, 0.34, 0.18], speed_m_per_s: 0.271,
+          distance_m: 34.52, target_age_s: 0.2, tilt_age_s: 0.1, rest_age_s: 128.4, came_too_late: 0, gaps: 0},
+        settlement: {base_run: 'rail_20260301_090000', later_run: 'rail_20261120_101500', at_utc_ms: utc - 2.6e8, highest_alert: 0}},
     };
   }
 
@@ -152,6 +156,7 @@ export class FakeBridge {
       changed.guidance = sections.guidance;
     }
     if (!held.has('shields')) { fresh(sections.shields.front); fresh(sections.shields.rear); changed.shields = sections.shields; }
+    if (!held.has('trolley') && sections.trolley.state) { fresh(sections.trolley.state, 400); changed.trolley = sections.trolley; }
     if (!held.has('camera')) { fresh(sections.camera.pose); fresh(sections.camera.frame); changed.camera = sections.camera; }
     if (!held.has('devices')) for (const device of sections.devices) if (!held.has(device.id)) fresh(device, 3000);
     if (!held.has('station')) for (const role of ['in_use', 'proposed', 'previous']) fresh(sections.station[role], 3000);

@@ -61,6 +61,14 @@ export const SCENES = {
       alarm('low_power', 'low', {source: 'total_station', phase: 'acknowledged', acknowledged_by: 'li', cause: "The total station's battery is nearly empty.", response: 'Change the battery or connect external power.', raised_at_utc_ms: utc - 600000, shelved_until_utc_ms: utc + 1500000, shelved_by: 'li', shelved_because: 'spare battery comes with the next train'})],
       first_out: 'guidance/tilt_late'};
   }),
+  trolley_open: (bridge) => bridge.set((s) => {
+    Object.assign(s.trolley.state, {status: 'open', position_sigma_mm: [3.2, 8.4, 1.9], target_age_s: 14.2, came_too_late: 3});
+    s.trolley.settlement.highest_alert = 2;
+  }),
+  trolley_none: (bridge) => bridge.set((s) => {
+    Object.assign(s.trolley.state, {status: 'none', reason: 'waiting_for_rest', position_world_m: null, position_sigma_mm: null, speed_m_per_s: null, distance_m: null, target_age_s: null, tilt_age_s: null, rest_age_s: null});
+    s.trolley.settlement = null;
+  }),
   move: (bridge) => bridge.set((s) => {
     Object.assign(s.station.in_use, {state: 'suspect', reason: 'station_moving'});
     s.station.proposed = {...bridge.setUp(5, 'good', ''), closure_mm: [0.8, -0.6, 0.3], closure_worst_mm: 1.6, closure_tolerance_mm: 3, closure_points: 5};

@@ -16,6 +16,7 @@ const SHOTS = [
   ['de_steer_night', 'alarms', PC, {language: 'de', signs: 'steer', theme: 'night', angles: 'deg', chainage: 'internal'}],
   ['alarms', 'alarms', PC, {}, 'alarms'], ['alarms_zh', 'alarms', PC, {language: 'zh'}, 'alarms'], ['events', 'ok', PC, {}, 'events'], ['camera', 'degraded', PC, {}, 'camera'], ['settings', 'ok', PC, {}, 'settings'],
   ['station', 'move', PC, {}, 'station'], ['station_de', 'move', PC, {language: 'de'}, 'station'], ['station_night', 'ok', PC, {theme: 'night'}, 'station'],
+  ['trolley', 'ok', PC, {}, 'trolley'], ['trolley_open_de', 'trolley_open', PC, {language: 'de'}, 'trolley'], ['trolley_none_zh_night', 'trolley_none', PC, {language: 'zh', theme: 'night'}, 'trolley'],
   ['no_connection', 'ok', PC, {}], ['detail', 'coasting', PC, {}], ['shelve', 'alarms', PC, {}, 'alarms'], ['login', 'ok', PC, {}],
   ['tablet_landscape', 'ok', [1024, 768], {}], ['tablet_portrait', 'alarms', [768, 1024], {language: 'de'}], ['large', 'ok', [1920, 1080], {}],
 ];

@@ -18,7 +18,7 @@ function Section(text: string, title: string): string {
 const FirstCells = (text: string) => text.split('\n').filter((line) => line.startsWith('| `')).flatMap((line) => Codes(line.split('|')[1] ?? ''));
 
 const idl = Read('idl/README.md');
-const PAGE_REASONS = ['never_heard', 'no_value', 'contested'];
+const PAGE_REASONS = ['never_heard', 'no_value', 'contested', 'trolley_gap', 'trolley_open'];
 
 function Reasons(): Set<string> {
   const section = Section(idl, 'Reasons');

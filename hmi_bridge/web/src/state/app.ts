@@ -10,7 +10,7 @@ import {Sound} from './sound';
 import {Track} from './track';
 import type {Alarm, Command, CommandRequest, Me, Role, Sections, Snapshot, Urgency} from './types';
 
-export const ROUTES = ['drive', 'alarms', 'events', 'camera', 'station', 'reports', 'settings'] as const;
+export const ROUTES = ['drive', 'alarms', 'events', 'camera', 'station', 'trolley', 'reports', 'settings'] as const;
 export type Route = (typeof ROUTES)[number];
 
 export type Dialog =

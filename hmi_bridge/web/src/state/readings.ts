@@ -4,7 +4,7 @@ import {Chainage, DASHES, Fixed, Signed} from './format';
 import {Judge, JudgeNumber, type Judgement, type ReaderClocks, type Receipt} from './freshness';
 import type {Settings} from './settings';
 import {AngleDigits, AngleFromDeg, AngleFromMmPerM, AngleUnit, DirectionOf, Shown, type Direction} from './signs';
-import type {Guidance, Point, Sections, Shield, Timing} from './types';
+import type {Guidance, Point, Sections, Shield, Timing, TrolleyState} from './types';
 
 export interface Reading {
   id: string;
@@ -41,6 +41,15 @@ export interface ReadingsInput {
   now: ReaderClocks;
   settings: Settings;
   words: Words;
+}
+
+// A place that nothing outside of the unit holds is worth less, whatever its sender says of it.
+export function TrolleyPart(state: TrolleyState | null): Part | null {
+  if (!state) return null;
+  const {timing, status} = state;
+  if (status === 'none') return {timing, validity: 'invalid', reason: state.reason};
+  if (status === 'fixed') return {timing, validity: 'valid', reason: state.reason};
+  return {timing, validity: 'degraded', reason: state.reason || (status === 'gap' ? 'trolley_gap' : 'trolley_open')};
 }
 
 // The big numbers: a digit that is always noise is not worth its width.
@@ -127,6 +136,18 @@ export function ReadingsOf(input: ReadingsInput): Readings {
   const front = sections.shields?.front ?? null;
   put('speed', words.t('speed'), 'mm/min', front, front?.speed_mm_per_min ?? null, Fixed(front?.speed_mm_per_min, 0),
     {sigma: front?.speed_sigma_mm_per_min ?? null, sigma_text: Fixed(front?.speed_sigma_mm_per_min, 1), rests_on_s: front?.age_s ?? null});
+
+  const trolley = sections.trolley?.state ?? null;
+  const rail = TrolleyPart(trolley);
+  const apart = {about_guidance: false};
+  put('trolley_distance', words.t('trolley_distance'), 'm', rail, trolley?.distance_m ?? null, Fixed(trolley?.distance_m, 2), apart);
+  put('trolley_speed', words.t('trolley_speed'), 'm/s', rail, trolley?.speed_m_per_s ?? null, Fixed(trolley?.speed_m_per_s, 3), apart);
+  (['x', 'y', 'z'] as const).forEach((axis, i) => {
+    const value = trolley?.position_world_m?.[i] ?? null;
+    const sigma = trolley?.position_sigma_mm?.[i] ?? null;
+    put(`trolley_${axis}`, `${words.t('trolley')}, ${axis}`, 'm', rail, value, Fixed(value, 4),
+      {...apart, sigma, sigma_text: `${Fixed(sigma, 2)} mm`});
+  });
   return readings;
 }
 

@@ -21,6 +21,7 @@ export type Alarms = Schemas['Alarms'];
 export type Alarm = Schemas['Alarm'];
 export type ConsoleEvent = Schemas['Event'];
 export type Command = Schemas['Command'];
+export type TrolleyState = Schemas['TrolleyState'];
 export type Report = Schemas['Report'];
 export type ReportRequest = Schemas['ReportRequest'];
 export type History = Schemas['History'];

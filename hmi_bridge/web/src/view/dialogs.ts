@@ -40,7 +40,7 @@ function ReadingDetails(app: App, id: string): TemplateResult {
       ${Line(words.t('quality'), QualityText(judged, words))}
       ${Line('', nothing)}
       ${judged.quality === 'stale' ? Line(words.t('value'), LastText(reading, words)) : nothing}
-      ${isLive && reading.sigma !== null ? Line(words.t('sigma'), `${reading.sigma_text} ${reading.id === 'chainage' ? '' : reading.unit}`) : nothing}
+      ${isLive && reading.sigma !== null ? Line(words.t('sigma'), `${reading.sigma_text} ${reading.unit === 'm' ? '' : reading.unit}`) : nothing}
       ${Line(words.t('band95'), band)}
       ${reading.limit === null ? nothing : Line(words.t('limit'), `±${Fixed(reading.limit, 1)} ${reading.unit}`)}
       ${Line(words.t('trend'), isLive ? reading.trend : '')}

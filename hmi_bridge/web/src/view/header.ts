@@ -12,6 +12,7 @@ const ICONS: Record<Route, TemplateResult> = {
   events: svg`<path d="M3 5h18M3 12h18M3 19h12"/>`,
   camera: svg`<path d="M2 6h5l2-2h6l2 2h5v14H2z"/><circle cx="12" cy="13" r="4"/>`,
   station: svg`<path d="M12 12L5 22M12 12l7 10M12 12v10M8 3h8v7H8zM16 6h3"/>`,
+  trolley: svg`<path d="M2 20h20M5 14h14l-2-7H7z"/><circle cx="8" cy="17" r="2"/><circle cx="16" cy="17" r="2"/>`,
   reports: svg`<path d="M5 2h10l4 4v16H5zM14 2v5h5"/><path d="M8 12h8M8 16h8"/>`,
   settings: svg`<path d="M3 6h10M19 6h2M3 12h2M11 12h10M3 18h8M17 18h4"/><circle cx="16" cy="6" r="2.5"/><circle cx="8" cy="12" r="2.5"/><circle cx="14" cy="18" r="2.5"/>`,
 };

@@ -17,6 +17,7 @@ import type {Sizes} from './sizes';
 import {StationPage} from './station_page';
 import {Strips} from './strip';
 import {Target} from './target';
+import {TrolleyPage} from './trolley_page';
 
 function DrivePage(app: App, sizes: Sizes): TemplateResult {
   const readings = app.readings();
@@ -58,6 +59,7 @@ export function Page(app: App, sizes: Sizes): TemplateResult {
     events: () => EventsPage(app),
     camera: () => CameraPage(app),
     station: () => StationPage(app),
+    trolley: () => TrolleyPage(app),
     reports: () => ReportsPage(app),
     settings: () => SettingsPage(app),
   }[app.route]();
