@@ -6,9 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "guidance/app/calibrate_command.h"
-#include "guidance/app/rail_run.h"
+#include "guidance/app/rail_run_for.h"
 #include "guidance/app/rail_start_words.h"
-#include "guidance/app/table_and_report.h"
 #include "guidance/config/rail_file.h"
 #include "guidance/config/rail_file_text.h"
 #include "guidance/rail/mounting_calibration.h"
@@ -201,16 +200,8 @@ std::string Summary(const RailCamera& first, const MountingCalibration& found) {
 
 ExitCode RunCalibrateImu(const CalibrateImuRequest& request, const Console& console) {
   const TableAndReport files(request.out, request.force);
-  if (const auto obstacle = files.Obstacle()) {
-    Complain(console, *obstacle);
-    return ExitCode::kBadInput;
-  }
-  const auto run = ReadRailRun(request.run);
-  if (!run) {
-    Complain(console, run.error());
-    return ExitCode::kBadInput;
-  }
-  for (const std::string& warning : run->warnings) Complain(console, "warning: " + warning);
+  const auto run = RailRunFor(request.run, files, console);
+  if (!run) return ExitCode::kBadInput;
   for (const std::string& advice : run->advice) Complain(console, "warning: " + advice);
   const auto found = CalibrateMounting(run->setup, run->recording, LimitsOf(request));
   if (!found) {

@@ -9,9 +9,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "guidance/app/rail_run.h"
+#include "guidance/app/rail_run_for.h"
 #include "guidance/app/rail_start_words.h"
-#include "guidance/app/table_and_report.h"
 #include "guidance/rail/inertial_line.h"
 #include "guidance/rail/rail_line.h"
 
@@ -175,16 +174,8 @@ Result<RailLine, RailStartFailure> Solve(const LineRequest& request, const RailR
 
 ExitCode RunLine(const LineRequest& request, const Console& console) {
   const TableAndReport files(request.out, request.force);
-  if (const auto obstacle = files.Obstacle()) {
-    Complain(console, *obstacle);
-    return ExitCode::kBadInput;
-  }
-  const auto run = ReadRailRun(request.run);
-  if (!run) {
-    Complain(console, run.error());
-    return ExitCode::kBadInput;
-  }
-  for (const std::string& warning : run->warnings) Complain(console, "warning: " + warning);
+  const auto run = RailRunFor(request.run, files, console);
+  if (!run) return ExitCode::kBadInput;
   for (const std::string& advice : run->advice) Complain(console, "warning: " + advice);
   const auto line = Solve(request, *run);
   if (!line) {

@@ -7,9 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "guidance/app/frame_reader.h"
-#include "guidance/app/rail_run.h"
+#include "guidance/app/rail_run_for.h"
 #include "guidance/app/rail_start_words.h"
-#include "guidance/app/table_and_report.h"
 #include "guidance/rail_vision/target_search.h"
 
 namespace tbm {
@@ -120,16 +119,8 @@ std::string Explain(const SearchFailure& failure, const RailSetup& setup) {
 
 ExitCode RunTargets(const TargetsRequest& request, const Console& console) {
   const TableAndReport files(request.out, request.force);
-  if (const auto obstacle = files.Obstacle()) {
-    Complain(console, *obstacle);
-    return ExitCode::kBadInput;
-  }
-  const auto run = ReadRailRun(request.run);
-  if (!run) {
-    Complain(console, run.error());
-    return ExitCode::kBadInput;
-  }
-  for (const std::string& warning : run->warnings) Complain(console, "warning: " + warning);
+  const auto run = RailRunFor(request.run, files, console);
+  if (!run) return ExitCode::kBadInput;
   if (const auto missing = Missing(*run)) {
     Complain(console, request.run + "/" + *missing);
     return ExitCode::kBadInput;

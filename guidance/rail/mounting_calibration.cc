@@ -488,7 +488,10 @@ Result<MountingCalibration, MountingFailure> CalibrateMounting(const RailSetup& 
     return failure;
   }
   if (batch->moved() > kSettled) return Fail(MountingFault::kDoesNotSettle);
-  if (auto weak = WeakOf(batch->covariance(), limits); !weak.empty()) {
+  // As good as what is left over says, where that is more than chance.
+  const Eigen::Matrix<double, kShared, kShared> covariance =
+      std::max(1.0, chi2_per_dof) * batch->covariance();
+  if (auto weak = WeakOf(covariance, limits); !weak.empty()) {
     auto failure = Fail(MountingFault::kDegenerate);
     failure.error.weak = std::move(weak);
     return failure;
@@ -500,7 +503,7 @@ Result<MountingCalibration, MountingFailure> CalibrateMounting(const RailSetup& 
   result.time_offset_s = shared.time_offset_s;
   result.gyro_bias_rad_s = shared.gyro_bias_rad_s;
   result.accel_bias_m_s2 = shared.accel_bias_m_s2;
-  result.covariance = batch->covariance();
+  result.covariance = covariance;
   result.rounds = rounds;
   result.images = batch->images();
   result.points = batch->Points(false);
