@@ -457,6 +457,11 @@ class RailRunLoader {
     if (!run_.recording.tilts.empty() && !setup.tilt) {
       unused("tilt.csv", "rail.yaml has no section tilt");
     }
+    if (!run_.recording.tilts.empty() && setup.tilt && setup.tilt->sigma_rotation_rad <= 0.0) {
+      run_.warnings.push_back(PathOf("rail.yaml") +
+                              ": tilt: no sigma_rotation_deg: how the inclinometer is built in "
+                              "counts as exactly known");
+    }
     if (!run_.recording.images.empty() && !setup.camera) {
       unused("centres.csv", "rail.yaml has no section camera");
     }

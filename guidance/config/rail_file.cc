@@ -58,6 +58,9 @@ std::optional<TiltMounting> ReadTilt(const YamlNode& node) {
   const auto sigma_deg =
       keys.Require("sigma_deg", "noise of one reading").Number({0.0, 10.0, "deg", true});
   tilt.sigma_rad = DegToRad(sigma_deg.value_or(1.0));
+  double rotation_deg = 0.0;
+  keys.Number("sigma_rotation_deg", 0.0, 10.0, "deg", &rotation_deg);
+  tilt.sigma_rotation_rad = DegToRad(rotation_deg);
   keys.RefuseOthers();
   return tilt;
 }

@@ -9,7 +9,8 @@ namespace tbm {
 // An inclinometer that is fixed to the unit.
 struct TiltMounting {
   Eigen::Quaterniond housing_from_imu = Eigen::Quaterniond::Identity();
-  double sigma_rad = 0.0;  // of one angle of one reading, > 0
+  double sigma_rad = 0.0;           // of one angle of one reading, > 0
+  double sigma_rotation_rad = 0.0;  // of housing_from_imu about each axis that tilts; 0: exact
 };
 
 struct TiltAngles {

@@ -348,7 +348,8 @@ class Batch {
     Eigen::Matrix<double, 2, 3> by_direction = Eigen::Matrix<double, 2, 3>::Zero();
     by_direction(0, 0) = -1.0 / std::sqrt(1.0 - up.x() * up.x());
     by_direction(1, 1) = 1.0 / std::sqrt(1.0 - up.y() * up.y());
-    const double sigma_rad = setup_.tilt->sigma_rad / std::sqrt(count);
+    const double sigma_rad =
+        std::hypot(setup_.tilt->sigma_rad / std::sqrt(count), setup_.tilt->sigma_rotation_rad);
     normal->Add(
         {{FusionLayout::kAttitude, by_direction * housing_from_imu * Skew(up_in_imu) / sigma_rad}},
         (mean - predicted) / sigma_rad);

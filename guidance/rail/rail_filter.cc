@@ -30,6 +30,9 @@ std::vector<FusionOption> OptionsOf(const RailSetup& setup) {
     options = {
         FusionOption::kTimeOffset, FusionOption::kCameraRotation, FusionOption::kCameraPosition};
   }
+  if (setup.tilt && setup.tilt->sigma_rotation_rad > 0.0) {
+    options.push_back(FusionOption::kTiltOffset);
+  }
   if (setup.odometer) {
     options.push_back(FusionOption::kOdometerScale);
     options.push_back(FusionOption::kOdometerTurn);
@@ -68,6 +71,10 @@ RailPrior MakeRailPrior(const RailSetup& setup,
     sigma.segment<3>(prior.layout.At(FusionOption::kCameraPosition))
         .setConstant(camera.sigma_position_m);
   }
+  if (prior.layout.Has(FusionOption::kTiltOffset)) {
+    sigma.segment<2>(prior.layout.At(FusionOption::kTiltOffset))
+        .setConstant(setup.tilt->sigma_rotation_rad);
+  }
   if (setup.odometer) {
     sigma[prior.layout.At(FusionOption::kOdometerScale)] = setup.odometer->sigma_scale;
     sigma.segment<2>(prior.layout.At(FusionOption::kOdometerTurn))
@@ -87,7 +94,7 @@ RailPrior MakeRailPrior(const RailSetup& setup,
   const Eigen::Matrix3d imu_from_world = world_from_imu.conjugate().toRotationMatrix();
   const double level_rad =
       setup.tilt
-          ? kStartLevel_rad
+          ? std::hypot(kStartLevel_rad, setup.tilt->sigma_rotation_rad)
           : std::hypot(kStartLevel_rad, setup.imu.accel_bias_sigma_m_s2 / setup.gravity_m_s2);
   const double seen_rad =
       std::hypot(kStartHeading_rad, setup.camera ? setup.camera->sigma_rotation_rad : 0.0);

@@ -208,6 +208,16 @@ void FillEstimates(const FusionEpoch& last, const RailPrior& prior, RailLine* li
           "turning about two axes while targets are seen");
     }
   }
+  if (layout.Has(FusionOption::kTiltOffset)) {
+    constexpr std::array<const char*, 2> kAngles = {"tilt_offset_beta_rad",
+                                                    "tilt_offset_gamma_rad"};
+    for (int i = 0; i < 2; ++i) {
+      add(kAngles[static_cast<std::size_t>(i)],
+          layout.At(FusionOption::kTiltOffset) + i,
+          state.tilt_offset_rad[i],
+          "rest at two cants or gradients, turned end for end");
+    }
+  }
   if (layout.Has(FusionOption::kOdometerScale)) {
     add("odometer_scale", layout.At(FusionOption::kOdometerScale), state.odometer_scale, kStretch);
     for (int i = 0; i < 2; ++i) {

@@ -227,6 +227,36 @@ TEST(RailFilter, AWheelThatIsBuiltInAskewIsAsGoodAsItSays) {
   EXPECT_LT(tally.turn, 1.8);
 }
 
+TEST(RailFilter, AnInclinometerThatIsBuiltInAskewIsAsGoodAsItSays) {
+  double squared = 0.0;
+  double line = 0.0;
+  constexpr int kRuns = 24;
+  for (int seed = 0; seed < kRuns; ++seed) {
+    Random random("askew inclinometer", static_cast<std::uint64_t>(seed));
+    StraightRun run = RunStraight({}, random);
+    run.setup.tilt->sigma_rotation_rad = DegToRad(0.05);
+    const Eigen::Vector2d off_rad = random.Normal2(run.setup.tilt->sigma_rotation_rad);
+    for (TrolleyTilt& tilt : run.recording.tilts) {
+      tilt.angles.beta_rad += off_rad.x();
+      tilt.angles.gamma_rad += off_rad.y();
+    }
+    const auto solved = SolveRailLine(run.setup, run.recording, RailMethod::kSmoothed);
+    ASSERT_TRUE(solved);
+    line += Squared(solved->points.back(), run.truth.back()) / (3.0 * kRuns);
+    for (const RailEstimate& estimate : solved->estimates) {
+      if (!estimate.what.starts_with("tilt_offset")) continue;
+      const double truth = estimate.what == "tilt_offset_beta_rad" ? off_rad.x() : off_rad.y();
+      squared += std::pow((estimate.value - truth) / estimate.sigma, 2) / (2.0 * kRuns);
+    }
+  }
+  std::printf("error over sigma: offset %.2f, line %.2f\n", std::sqrt(squared), std::sqrt(line));
+  // Chi-squared with 48 and 72 degrees of freedom, 99.9 %.
+  EXPECT_GT(squared, 0.45);
+  EXPECT_LT(squared, 1.8);
+  EXPECT_GT(line, 0.52);
+  EXPECT_LT(line, 1.6);
+}
+
 // Displacements of the ground that begin and end between images of targets.
 TEST(RailFilter, ImagesOfTargetsAndOfTheGroundTakeTurns) {
   RailConsistency grounds;

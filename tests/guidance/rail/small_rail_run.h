@@ -23,7 +23,8 @@ inline RailRunTexts SmallRailRun() {
           "imu: {rate_hz: 50, angle_random_walk_deg_sqrt_h: 0.2, velocity_random_walk_ug_sqrt_hz: "
           "50, gyro_bias_deg_h: 30, accel_bias_mg: 1, gyro_instability_deg_h: 0.5, "
           "accel_instability_ug: 20}\n"
-          "tilt: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], sigma_deg: 0.01}\ncamera:\n") +
+          "tilt: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], sigma_deg: 0.01, sigma_rotation_deg: "
+          "0.01}\ncamera:\n") +
       lens +
       "  residual_px: 0.1\n  rotation: [0, -1, 0, 0, 0, -1, 1, 0, 0]\n  position_m: [0, 0, 0]\n"
       "  sigma_rotation_deg: 0.05\n  sigma_position_mm: 1\n  time_offset_s: 0\n"

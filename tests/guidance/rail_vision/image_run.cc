@@ -56,7 +56,7 @@ std::string Yaml(const RailSetup& setup) {
   std::string text =
       "imu: {rate_hz: 200, angle_random_walk_deg_sqrt_h: 0.2, "
       "velocity_random_walk_ug_sqrt_hz: 30, gyro_bias_deg_h: 30, accel_bias_mg: 1.0}\n" +
-      fmt::format("tilt: {{rotation: {}, sigma_deg: 0.003}}\n",
+      fmt::format("tilt: {{rotation: {}, sigma_deg: 0.003, sigma_rotation_deg: 0.002}}\n",
                   Rows(setup.tilt->housing_from_imu.toRotationMatrix()));
   if (setup.camera) {
     text += "camera:\n" + Lens(setup.camera->model) +
