@@ -3,6 +3,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <csignal>
 #include <cstdio>
 #include <mutex>
@@ -52,13 +53,16 @@ class Process {
     Signal(SIGKILL);
     Wait();
   }
-  // Exit code; 128 + n when a signal n ended it.
+  // Exit code; 128 + n when a signal n ended it. What it has said is then in the lines, unless a
+  // child of its own still holds the pipe open.
   int Wait() {
     if (pid_ <= 0 || is_reaped_) return exit_code_;
     int status = 0;
     waitpid(pid_, &status, 0);
     is_reaped_ = true;
     exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    std::unique_lock lock(mutex_);
+    all_read_.wait_for(lock, std::chrono::seconds(2), [this] { return is_all_read_; });
     return exit_code_;
   }
 
@@ -93,12 +97,17 @@ class Process {
       lines_.push_back(line);
     }
     std::fclose(stream);
+    const std::lock_guard lock(mutex_);
+    is_all_read_ = true;
+    all_read_.notify_all();
   }
 
   pid_t pid_ = -1;
   std::atomic<bool> is_reaped_ = false;
   int exit_code_ = -1;
   mutable std::mutex mutex_;
+  std::condition_variable all_read_;
+  bool is_all_read_ = false;
   std::vector<std::string> lines_;
   std::thread reader_;
 };
