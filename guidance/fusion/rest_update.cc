@@ -10,7 +10,12 @@ constexpr double kLeastLikely = 1e-6;
 }  // namespace
 
 FusionVerdict UpdateByRest(FusionFilter& filter, const RestNoise& noise) {
-  const FusionFilter::Held& held = filter.last_held();
+  return TryRest(filter, noise, filter.last_held());
+}
+
+FusionVerdict TryRest(FusionFilter& filter,
+                      const RestNoise& noise,
+                      const FusionFilter::Held& held) {
   const FusionState& state = filter.state();
   const FusionLayout& layout = filter.layout();
   const int rows = held.span_s > 0.0 ? 9 : 3;

@@ -16,4 +16,10 @@ struct RestNoise {
 // do not agree: a slow even motion looks like rest to the unit.
 FusionVerdict UpdateByRest(FusionFilter& filter, const RestNoise& noise);
 
+// The same with `shown`, means of samples that were integrated and not held: whether it may be rest
+// that begins. They are in the state already, so the filter is one to be thrown away.
+FusionVerdict TryRest(FusionFilter& filter,
+                      const RestNoise& noise,
+                      const FusionFilter::Held& shown);
+
 }  // namespace tbm

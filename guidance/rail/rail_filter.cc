@@ -182,6 +182,10 @@ void RailFilter::Advance(const ImuSample& sample, Timestamp to) {
     if (!in_gap_ && rests_now_ && SaysRest(to)) {
       Hold(sample, to);
     } else {
+      const double span_s = SecondsBetween(filter_->now(), to);
+      fed_.span_s += span_s;
+      fed_.gyro_rad_s += span_s * sample.gyro_rad_s;
+      fed_.accel_m_s2 += span_s * sample.accel_m_s2;
       FeedUpTo(*filter_, setup_, sample, to, gap_s_);
     }
   }
@@ -218,11 +222,17 @@ void RailFilter::IntegrateHeld() {
   filter_->BringForward();
 }
 
-// Whether the unit rests now. Tried before anything is remembered of this epoch.
+// Whether the unit rests now. Tried before anything is remembered of this epoch. An even push is as
+// quiet as rest: where rest begins, what was felt before must be gravity alone.
 bool RailFilter::TakeRest() {
+  const FusionFilter::Held fed = std::exchange(fed_, {});
   if (in_gap_ || !SaysRest(filter_->now())) return false;
   FusionFilter tried = *filter_;
-  const FusionVerdict verdict = UpdateByRest(tried, {});
+  const FusionVerdict verdict =
+      held_.empty() && fed.span_s > 0.0
+          ? TryRest(
+                tried, {}, {fed.span_s, fed.gyro_rad_s / fed.span_s, fed.accel_m_s2 / fed.span_s})
+          : UpdateByRest(tried, {});
   if (verdict.accepted) return true;
   Count(verdict);
   if (!held_.empty()) IntegrateHeld();

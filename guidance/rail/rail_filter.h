@@ -134,6 +134,7 @@ class RailFilter {
   std::optional<FusionFilter> filter_;  // always there; an optional can be set back
   std::vector<ImuSample> held_;         // since the last epoch, as rest; that may still prove wrong
   std::optional<FusionFilter> before_held_;
+  FusionFilter::Held fed_;  // sums of what was integrated since the last epoch
   FusionSmoother* const smoother_;
   std::optional<Timestamp> last_epoch_;
   bool rests_now_ = false;

@@ -42,8 +42,8 @@ TEST(SmallRailRun, IsReadWholeAndSolved) {
   const auto line = SolveRailLine(run->setup, run->recording, RailMethod::kSmoothed);
   ASSERT_TRUE(line);
   EXPECT_NEAR(line->points.back().position_world_m.x(), 0.05, 2e-3);
-  EXPECT_EQ(line->consistency[static_cast<std::size_t>(FusionUpdate::kTargetPixels)].given,
-            line->consistency[static_cast<std::size_t>(FusionUpdate::kTargetPixels)].accepted);
+  EXPECT_EQ(line->consistency[static_cast<std::size_t>(FusionUpdate::kTargets)].given,
+            line->consistency[static_cast<std::size_t>(FusionUpdate::kTargets)].accepted);
 }
 
 TEST(RailRunBytes, CutFlippedAndGluedFilesAreRefusedOrReadAsTheyStand) {
