@@ -71,8 +71,8 @@ class FakeLink final : public ByteLink {
   }
 
   void ArriveAt(SteadyTime at, const Bytes& bytes) {
-    for (const std::uint8_t byte : bytes) arriving_.push_back({at, byte});
-    std::ranges::stable_sort(arriving_, {}, &Arriving::at);
+    auto place = std::ranges::upper_bound(arriving_, at, {}, &Arriving::at);
+    for (const std::uint8_t byte : bytes) place = arriving_.insert(place, {at, byte}) + 1;
   }
 
   std::optional<LinkFailure> open_failure;
