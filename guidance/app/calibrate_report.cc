@@ -39,6 +39,26 @@ std::size_t UsedPictures(const CameraCalibration& found) {
   return used;
 }
 
+// The camera as a rig file has it, to stand under `calibrated`.
+std::string FoundWithYaml(const CameraModel& c) {
+  return fmt::format(
+      "  camera:   # that the rotation was found with, and belongs to\n"
+      "    image_width: {}\n    image_height: {}\n"
+      "    camera_matrix: {{data: [{}, 0.0, {}, 0.0, {}, {}, 0.0, 0.0, 1.0]}}\n"
+      "    distortion_coefficients: {{data: [{}, {}, {}, {}, {}]}}\n",
+      c.image_width_px,
+      c.image_height_px,
+      c.fx_px,
+      c.cx_px,
+      c.fy_px,
+      c.cy_px,
+      c.k1,
+      c.k2,
+      c.p1,
+      c.p2,
+      c.k3);
+}
+
 }  // namespace
 
 std::string CameraYaml(const CameraCalibration& found,
@@ -133,12 +153,7 @@ std::string TiltYaml(const TiltResult& result) {
       found.dof);
   text += "  # of the turn that is still missing, about the camera's axes\n  covariance_deg2: " +
           RowByRow(Eigen::Matrix3d(per_rad * per_rad * found.covariance), "{:.6e}") + "\n";
-  const CameraModel& c = result.camera;
-  text += fmt::format("  camera_px: [{}, {}, {}, {}]   # fx fy cx cy of the camera's file\n",
-                      c.fx_px,
-                      c.fy_px,
-                      c.cx_px,
-                      c.cy_px);
+  text += FoundWithYaml(result.camera);
   text += "  up_in_board: " + RowByRow(found.up_in_board.transpose().eval(), "{:.9f}") + "\n";
   if (!result.up_was_given) {
     text += fmt::format("  up_sigma_deg: {:.5f}\n", RadToDeg(found.up_sigma_rad));
