@@ -102,7 +102,7 @@ void AddCamera(CLI::App* calibrate, CalibrateCameraRequest& request) {
 
 // What every reading of an inclinometer needs.
 void AddTiltReading(CLI::App* command, double& sigma_deg, std::vector<double>& sign) {
-  command->add_option("--sigma-deg", sigma_deg, "of one reading of the inclinometer")
+  command->add_option("--sigma-deg", sigma_deg, "of one reading, where tilt.csv has no sigma_deg")
       ->check(CLI::Range(1e-6, 10.0))
       ->capture_default_str();
   command->add_option("--sign", sign, "of beta and gamma, +1 or -1: what a rig file calls sign")
