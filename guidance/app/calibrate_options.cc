@@ -75,7 +75,8 @@ constexpr const char* kRigHelp =
     "  rig_name: north_2\n"
     "  points:\n"
     "    shield_head: {xyz_mm: [3.0, -5.0, -1600.0], sigma_mm: 0.2}   # in the target frame\n"
-    "An old rig file may stand for any of them. A sigma that is missing is a fault.\n"
+    "An old rig file may stand for any of them; a tilt belongs to the camera it was found with.\n"
+    "A sigma that is missing is a fault.\n"
     "\n"
     "What the calibration is worth is printed for each point: one row for each source of error, in "
     "mm to the\n"
@@ -116,7 +117,7 @@ void AddCamera(CLI::App* calibrate, CalibrateCameraRequest& request) {
 
 // What every reading of an inclinometer needs.
 void AddTiltReading(CLI::App* command, double& sigma_deg, std::vector<double>& sign) {
-  command->add_option("--sigma-deg", sigma_deg, "of one reading of the inclinometer")
+  command->add_option("--sigma-deg", sigma_deg, "of one reading, where tilt.csv has no sigma_deg")
       ->check(CLI::Range(1e-6, 10.0))
       ->capture_default_str();
   command->add_option("--sign", sign, "of beta and gamma, +1 or -1: what a rig file calls sign")

@@ -39,6 +39,26 @@ std::size_t UsedPictures(const CameraCalibration& found) {
   return used;
 }
 
+// The camera as a rig file has it, to stand under `calibrated`.
+std::string FoundWithYaml(const CameraModel& c) {
+  return fmt::format(
+      "  camera:   # that the rotation was found with, and belongs to\n"
+      "    image_width: {}\n    image_height: {}\n"
+      "    camera_matrix: {{data: [{}, 0.0, {}, 0.0, {}, {}, 0.0, 0.0, 1.0]}}\n"
+      "    distortion_coefficients: {{data: [{}, {}, {}, {}, {}]}}\n",
+      c.image_width_px,
+      c.image_height_px,
+      c.fx_px,
+      c.cx_px,
+      c.fy_px,
+      c.cy_px,
+      c.k1,
+      c.k2,
+      c.p1,
+      c.p2,
+      c.k3);
+}
+
 }  // namespace
 
 std::string CameraYaml(const CameraCalibration& found,
@@ -125,20 +145,16 @@ std::string TiltYaml(const TiltResult& result) {
   std::string text = "inclinometers:\n  camera:\n" + TiltMountYaml(mount);
   text += "# What these numbers rest on. No part of a rig file.\ncalibrated:\n";
   text += fmt::format(
-      "  pictures: {}\n  board_residual_px: {:.4f}\n  chi2: {:.2f}\n  "
-      "degrees_of_freedom: {}\n",
-      result.pictures,
+      "  pictures: {}\n  board_residual_px: {:.4f}\n  chi2: {:.2f}\n"
+      "  degrees_of_freedom: {}\n  sigma_factor: {:.4g}\n",
+      result.pictures.size(),
       result.residual_px,
       found.chi2,
-      found.dof);
+      found.dof,
+      found.sigma_factor);
   text += "  # of the turn that is still missing, about the camera's axes\n  covariance_deg2: " +
           RowByRow(Eigen::Matrix3d(per_rad * per_rad * found.covariance), "{:.6e}") + "\n";
-  const CameraModel& c = result.camera;
-  text += fmt::format("  camera_px: [{}, {}, {}, {}]   # fx fy cx cy of the camera's file\n",
-                      c.fx_px,
-                      c.fy_px,
-                      c.cx_px,
-                      c.cy_px);
+  text += FoundWithYaml(result.camera);
   text += "  up_in_board: " + RowByRow(found.up_in_board.transpose().eval(), "{:.9f}") + "\n";
   if (!result.up_was_given) {
     text += fmt::format("  up_sigma_deg: {:.5f}\n", RadToDeg(found.up_sigma_rad));
@@ -149,15 +165,26 @@ std::string TiltYaml(const TiltResult& result) {
 std::string TiltSummary(const TiltResult& result) {
   const Eigen::Vector3d sigma_deg =
       RadToDeg(1.0) * result.rotation.covariance.diagonal().cwiseSqrt();
-  return fmt::format(
+  std::string text = fmt::format(
       "{} placements; sigma {:.4f} / {:.4f} / {:.4f} degrees about the camera's x / y / z; chi2 "
-      "{:.1f} of {} degrees of freedom\n",
-      result.pictures,
+      "{:.1f} of {} degrees of freedom\n"
+      "of one reading {:.4g} degrees: the largest that tilt.csv, or else --sigma-deg, says\n\n"
+      "  reading off deg   expected   picture\n",
+      result.pictures.size(),
       sigma_deg.x(),
       sigma_deg.y(),
       sigma_deg.z(),
       result.rotation.chi2,
-      result.rotation.dof);
+      result.rotation.dof,
+      result.sigma_deg);
+  for (std::size_t i = 0; i < result.pictures.size(); ++i) {
+    const TiltReading& reading = result.rotation.readings[i];
+    text += fmt::format("{:>17.4f} {:>10.4f}   {}\n",
+                        RadToDeg(reading.off_rad),
+                        RadToDeg(reading.sigma_rad),
+                        result.pictures[i]);
+  }
+  return text;
 }
 
 }  // namespace tbm

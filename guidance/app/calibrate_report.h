@@ -19,14 +19,15 @@ std::string CameraSummary(const CameraCalibration& found, const FoundBoards& boa
 // The inclinometer part of a rig file that belongs to the camera, and what it is worth.
 struct TiltResult {
   TiltRotation rotation;
-  double sigma_deg = 0.0;    // of one reading
-  std::vector<double> sign;  // as in a rig file
-  std::size_t pictures = 0;
+  double sigma_deg = 0.0;             // of one reading
+  std::vector<double> sign;           // as in a rig file
+  std::vector<std::string> pictures;  // side by side with the rotation's readings
   double residual_px = 0.0;
   CameraModel camera;  // that it was found with
   bool up_was_given = false;
 };
 std::string TiltYaml(const TiltResult& result);
+// For the person who waits: sigmas, and what each picture's reading is off.
 std::string TiltSummary(const TiltResult& result);
 
 }  // namespace tbm

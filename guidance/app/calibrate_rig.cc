@@ -1,3 +1,4 @@
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -40,31 +41,53 @@ std::optional<Parts> ReadParts(const CalibrateRigRequest& request, const Console
   return parts;
 }
 
+// Two cameras' numbers for one parameter, and how far they may be apart: a thousandth of a pixel in
+// the corner of an image.
+struct LensNumber {
+  const char* name;
+  double own;
+  double other;
+  double most_apart;
+};
+
+// The first number that is not the same.
+std::optional<LensNumber> Difference(const CameraModel& own, const CameraModel& other) {
+  constexpr double kPixel = 1e-3;
+  constexpr double kCoefficient = 1e-6;
+  const std::array<LensNumber, 11> numbers = {
+      {{"image_width", 1.0 * own.image_width_px, 1.0 * other.image_width_px, 0.5},
+       {"image_height", 1.0 * own.image_height_px, 1.0 * other.image_height_px, 0.5},
+       {"fx", own.fx_px, other.fx_px, kPixel},
+       {"fy", own.fy_px, other.fy_px, kPixel},
+       {"cx", own.cx_px, other.cx_px, kPixel},
+       {"cy", own.cy_px, other.cy_px, kPixel},
+       {"k1", own.k1, other.k1, kCoefficient},
+       {"k2", own.k2, other.k2, kCoefficient},
+       {"p1", own.p1, other.p1, kCoefficient},
+       {"p2", own.p2, other.p2, kCoefficient},
+       {"k3", own.k3, other.k3, kCoefficient}}};
+  for (const LensNumber& number : numbers) {
+    if (!(std::abs(number.own - number.other) < number.most_apart)) return number;
+  }
+  return std::nullopt;
+}
+
 // A rotation found with one camera file takes up what that file has wrong: with another it is
 // wrong.
 std::optional<RigFileFault> OtherCamera(const Parts& parts, const CalibrateRigRequest& request) {
-  if (!parts.tilt.camera_px) return std::nullopt;
-  const CameraModel& c = parts.camera.rig.camera;
-  const Eigen::Vector4d own_px(c.fx_px, c.fy_px, c.cx_px, c.cy_px);
-  const Eigen::Vector4d& with_px = *parts.tilt.camera_px;
-  if ((own_px - with_px).cwiseAbs().maxCoeff() < 1e-3) return std::nullopt;
+  const auto difference = Difference(parts.camera.rig.camera, parts.tilt.camera);
+  if (!difference) return std::nullopt;
   return RigFileFault{
       request.tilt,
-      parts.tilt.camera_px_line,
-      "calibrated.camera_px",
-      fmt::format(
-          "was found with another camera, fx fy cx cy = {:.3f} {:.3f} {:.3f} {:.3f} px, and "
-          "{} has {:.3f} {:.3f} {:.3f} {:.3f}; run tbm calibrate tilt with --camera {}",
-          with_px[0],
-          with_px[1],
-          with_px[2],
-          with_px[3],
-          request.camera,
-          own_px[0],
-          own_px[1],
-          own_px[2],
-          own_px[3],
-          request.camera)};
+      parts.tilt.camera_line,
+      parts.tilt.camera_key,
+      fmt::format("the rotation was found with another camera: {} is {} here and {} in {}; "
+                  "run tbm calibrate tilt with --camera {}",
+                  difference->name,
+                  difference->other,
+                  difference->own,
+                  request.camera,
+                  request.camera)};
 }
 
 std::optional<Rig> RigOf(Parts parts, const CalibrateRigRequest& request, const Console& console) {

@@ -16,6 +16,7 @@
 #include "guidance/app/target_report.h"
 #include "pose/base/angle.h"
 #include "pose/base/length.h"
+#include "pose/calibrate/misfit.h"
 
 namespace tbm {
 namespace {
@@ -23,8 +24,6 @@ namespace {
 constexpr const char* kTiltTable = "tilt.csv";
 // Two pointings at one LED further apart than so many sigmas are of two placements.
 constexpr double kMostApart = 8.0;
-// Once in a thousand by chance: worth a look, not worth a refusal. Three degrees of freedom.
-constexpr double kDoubtful = 16.3;
 
 struct Measured {
   std::vector<std::string> files;
@@ -87,13 +86,36 @@ std::optional<Measured> ReadPlacements(const CalibrateTargetRequest& request,
   return measured;
 }
 
-// tilt.csv names a file with or without its ending.
-std::optional<std::size_t> PlacementOf(const std::string& name,
-                                       const std::vector<std::string>& files) {
+// The files that a name in tilt.csv may mean: it has the ending, or leaves it out.
+std::vector<std::size_t> FilesNamed(const std::string& name,
+                                    const std::vector<std::string>& files) {
+  std::vector<std::size_t> named;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    if (name == files[i] || name == std::filesystem::path(files[i]).stem().string()) return i;
+    if (name == files[i]) return {i};
+    if (name == std::filesystem::path(files[i]).stem().string()) named.push_back(i);
   }
-  return {};
+  return named;
+}
+
+// What is wrong with a row's name; `lines` says where each placement has its reading already.
+std::optional<std::string> NameFault(const CalibrationTilt& tilt,
+                                     const std::vector<std::string>& files,
+                                     const std::vector<int>& lines) {
+  const std::vector<std::size_t> named = FilesNamed(tilt.name, files);
+  if (named.empty()) {
+    return fmt::format(
+        "{} is no file of the folder; it has {}", Quoted(tilt.name), fmt::join(files, ", "));
+  }
+  if (named.size() > 1) {
+    return fmt::format("{} may be {} or {}; write the ending as well",
+                       Quoted(tilt.name),
+                       files[named[0]],
+                       files[named[1]]);
+  }
+  if (lines[named[0]] == 0) return {};
+  return fmt::format("{} has its reading in line {} already; one belongs to a placement",
+                     files[named[0]],
+                     lines[named[0]]);
 }
 
 // Puts the readings to their placements. False, and said, where a row cannot be used.
@@ -116,19 +138,16 @@ bool ReadTilts(const CalibrateTargetRequest& request, Measured* measured, const 
     return false;
   }
   FileFaults faults;
+  std::vector<int> lines(measured->files.size(), 0);
   for (const CalibrationTilt& tilt : *tilts) {
-    const auto at = PlacementOf(tilt.name, measured->files);
-    if (!at) {
-      faults.push_back({path,
-                        tilt.line,
-                        "placement",
-                        fmt::format("{} is no file of the folder; it has {}",
-                                    Quoted(tilt.name),
-                                    fmt::join(measured->files, ", "))});
+    if (auto fault = NameFault(tilt, measured->files, lines)) {
+      faults.push_back({path, tilt.line, "placement", std::move(*fault)});
       continue;
     }
-    measured->placements[*at].up_in_housing = tilt.up_in_housing;
-    measured->placements[*at].tilt_sigma_rad = tilt.sigma_rad;
+    const std::size_t at = FilesNamed(tilt.name, measured->files)[0];
+    lines[at] = tilt.line;
+    measured->placements[at].up_in_housing = tilt.up_in_housing;
+    measured->placements[at].tilt_sigma_rad = tilt.sigma_rad;
   }
   Complain(console, faults);
   return faults.empty();
@@ -198,61 +217,99 @@ std::string OtherBoard(const TargetCalibrationFailure& failure,
   return text;
 }
 
-std::string Explain(const TargetCalibrationFailure& failure,
-                    const CalibrateTargetRequest& request,
-                    const Measured& measured,
-                    const std::vector<Led>& leds) {
+// A line for each point that does not fit; some cannot be told apart.
+std::vector<std::string> WrongPoints(const std::vector<WrongTargetPoint>& wrong,
+                                     const CalibrateTargetRequest& request,
+                                     const Measured& measured,
+                                     const std::vector<Led>& leds) {
+  const auto name = [&](const TargetPoint& point) {
+    return fmt::format(
+        "{}/{}: {}", request.folder, measured.files[point.placement], leds[point.led].id);
+  };
+  std::vector<std::string> lines;
+  for (const WrongTargetPoint& one : wrong) {
+    const double off_mm = kMmPerMetre * one.off_m;
+    if (one.or_rather.empty()) {
+      lines.push_back(fmt::format(
+          "{} is {:.2f} mm from where all other points put it, and measuring explains {} mm "
+          "(--sigma-mm); measure it again there, or take the row out",
+          name(one.point),
+          off_mm,
+          request.sigma_mm));
+      continue;
+    }
+    std::string names = name(one.point);
+    for (const TargetPoint& other : one.or_rather) names += ", " + name(other);
+    lines.push_back(fmt::format(
+        "{}: contradict one another: one of them is {:.2f} mm off, and measuring explains {} mm "
+        "(--sigma-mm); measure them again, or add another placement, which may tell",
+        names,
+        off_mm,
+        request.sigma_mm));
+  }
+  return lines;
+}
+
+std::string Scattered(const TargetCalibrationFailure& failure,
+                      const CalibrateTargetRequest& request,
+                      const Measured& measured,
+                      const std::vector<Led>& leds) {
+  const WrongTargetPoint& worst = failure.wrong[0];
+  return fmt::format(
+      "{}: the points scatter {:.1f} times as much as --sigma-mm {} says, three times is the most, "
+      "and no few of them are to blame; say what this total station can do, or measure again; the "
+      "worst is {}: {}, {:.2f} mm from where all others put it",
+      request.folder,
+      failure.sigma_factor,
+      request.sigma_mm,
+      measured.files[worst.point.placement],
+      leds[worst.point.led].id,
+      kMmPerMetre * worst.off_m);
+}
+
+// One line, or one for each point.
+std::vector<std::string> Explain(const TargetCalibrationFailure& failure,
+                                 const CalibrateTargetRequest& request,
+                                 const Measured& measured,
+                                 const std::vector<Led>& leds) {
   const std::string& led = leds[failure.led].id;
   const std::string file = request.folder + "/" + measured.files[failure.placement];
   const TargetPlacement& placement = measured.placements[failure.placement];
   switch (failure.fault) {
     case TargetCalibrationFault::kTooFewLeds:
-      return fmt::format("{}: has {} only; three LEDs or more are needed, not on one line",
-                         file,
-                         NamesOf(placement, leds));
+      return {fmt::format("{}: has {} only; three LEDs or more are needed, not on one line",
+                          file,
+                          NamesOf(placement, leds))};
     case TargetCalibrationFault::kNeverMeasured:
-      return fmt::format(
-          "{}: LED {} was measured in no placement; measure it, or take it out of {}",
-          request.folder,
-          led,
-          request.nominal);
+      return {
+          fmt::format("{}: LED {} was measured in no placement; measure it, or take it out of {}",
+                      request.folder,
+                      led,
+                      request.nominal)};
     case TargetCalibrationFault::kOnOneLine:
-      return fmt::format(
+      return {fmt::format(
           "{}: its LEDs {} stand on one line, so nobody can tell how the board is turned about it; "
           "measure one beside it as well",
           file,
-          NamesOf(placement, leds));
+          NamesOf(placement, leds))};
     case TargetCalibrationFault::kExchanged:
-      return fmt::format("{}: names are exchanged: {}; give each point the name painted at its LED",
-                         file,
-                         Exchanged(failure.really, leds));
+      return {
+          fmt::format("{}: names are exchanged: {}; give each point the name painted at its LED",
+                      file,
+                      Exchanged(failure.really, leds))};
     case TargetCalibrationFault::kMirrored:
-      return fmt::format(
+      return {fmt::format(
           "{}: the points are a mirror image of the board: two columns are exchanged, or one has "
           "the wrong sign; right is x, y, z = east, north, height",
-          file);
+          file)};
     case TargetCalibrationFault::kDoesNotFit:
-      if (failure.or_placement) {
-        return fmt::format(
-            "{} and {}: contradict each other: in one of them {} is {:.2f} mm off, and measuring "
-            "explains {} mm; measure it again in both, or add a third placement that tells which",
-            file,
-            measured.files[*failure.or_placement],
-            led,
-            kMmPerMetre * failure.off_m,
-            request.sigma_mm);
-      }
-      return fmt::format(
-          "{}: {} is {:.2f} mm from where all other points put it, and measuring explains {} mm "
-          "(--sigma-mm); measure it again there, or take the row out",
-          file,
-          led,
-          kMmPerMetre * failure.off_m,
-          request.sigma_mm);
+      return WrongPoints(failure.wrong, request, measured, leds);
+    case TargetCalibrationFault::kScatters:
+      return {Scattered(failure, request, measured, leds)};
     case TargetCalibrationFault::kOtherBoard:
-      return file + ": " + OtherBoard(failure, request, placement, leds);
+      return {file + ": " + OtherBoard(failure, request, placement, leds)};
   }
-  return file;
+  return {file};
 }
 
 // With one of the two angles counted the other way the readings may fit: then that is what is
@@ -267,6 +324,25 @@ bool FitsMirrored(const std::vector<Eigen::Vector3d>& nominal_m,
   return found && found->housing_from_target.has_value();
 }
 
+// Readings that the points and the other readings contradict.
+void SayWrongReadings(const std::vector<WrongTilt>& readings,
+                      const CalibrateTargetRequest& request,
+                      const std::vector<std::string>& files,
+                      const Console& console) {
+  for (const WrongTilt& wrong : readings) {
+    std::string names = files[wrong.placement];
+    for (const std::size_t other : wrong.or_rather) names += " or " + files[other];
+    Complain(console,
+             fmt::format("{}/{}: the reading of {} is {:.3f} degrees from where the points and all "
+                         "other readings put it, and measuring explains {:.3f}",
+                         request.folder,
+                         kTiltTable,
+                         names,
+                         RadToDeg(wrong.off_rad),
+                         RadToDeg(wrong.sigma_rad)));
+  }
+}
+
 // What is not right, but no reason to stop. False: it is one.
 bool JudgeMounting(const TargetResult& result, const Measured& measured, const Console& console) {
   const TargetCalibration& found = result.found;
@@ -275,7 +351,8 @@ bool JudgeMounting(const TargetResult& result, const Measured& measured, const C
       measured.placements.begin(), measured.placements.end(), [](const TargetPlacement& one) {
         return one.up_in_housing.has_value();
       }));
-  const bool contradicts = found.mounting_missing->fault == TiltRotationFault::kNoRotation;
+  const bool contradicts = found.mounting_missing->fault == TiltRotationFault::kNoRotation ||
+                           found.mounting_missing->fault == TiltRotationFault::kDoesNotFit;
   std::string text = MissingForMounting(*found.mounting_missing, readings);
   if (contradicts) {
     const double most_off_m = result.request.most_off_mm / kMmPerMetre;
@@ -283,6 +360,8 @@ bool JudgeMounting(const TargetResult& result, const Measured& measured, const C
       text += fmt::format("; with --sign {:.0f} {:.0f} they would fit",
                           -result.request.sign[0],
                           result.request.sign[1]);
+    } else {
+      SayWrongReadings(found.mounting_missing->wrong, result.request, result.files, console);
     }
     Complain(console, fmt::format("{}/{}: no R1: {}", result.request.folder, kTiltTable, text));
     return false;
@@ -303,9 +382,10 @@ void WarnOfPoints(const TargetResult& result, const Console& console) {
              "warning: nothing controls the points: each LED was measured in one placement only, "
              "and a wrong point stays unseen; add a second placement");
   }
-  const double doubtful = kDoubtful * found.sigma_factor * found.sigma_factor;
   for (const TargetSighting& sighting : found.sightings) {
-    if (sighting.misfit < doubtful) continue;
+    const double factor2 = found.sigma_factor * found.sigma_factor;
+    if (sighting.controlled == 0) continue;
+    if (sighting.misfit < factor2 * DoubtfulMisfit(sighting.controlled)) continue;
     Complain(
         console,
         fmt::format("warning: {}/{}: {} is {:.2f} mm from where all other points put it, which "
@@ -322,6 +402,12 @@ void WarnOfPoints(const TargetResult& result, const Console& console) {
                          "every sigma is that much larger",
                          found.sigma_factor,
                          result.request.sigma_mm));
+  }
+  if (found.mounting_factor > 1.0) {
+    Complain(console,
+             fmt::format("warning: the readings are {:.1f} times as far off as their sigma and the "
+                         "points' say; the sigma of the mounting is that much larger",
+                         found.mounting_factor));
   }
 }
 
@@ -357,7 +443,9 @@ ExitCode RunCalibrateTarget(const CalibrateTargetRequest& request, const Console
   const auto found =
       CalibrateTarget(PlacesOf(*leds), measured->placements, request.most_off_mm / kMmPerMetre);
   if (!found) {
-    Complain(console, Explain(found.error(), request, *measured, *leds));
+    for (const std::string& line : Explain(found.error(), request, *measured, *leds)) {
+      Complain(console, line);
+    }
     return ExitCode::kBadInput;
   }
   const TargetResult result{

@@ -131,13 +131,79 @@ Result<TiltRotation, TiltRotationFailure> Solve(const Placements& placements,
   return FindTiltRotation(list, options);
 }
 
-std::string Explain(const TiltRotationFailure& failure, std::size_t placements) {
-  std::string text = MissingMotion(failure.fault);
-  text += fmt::format(" ({} placements", placements);
-  if (std::isfinite(failure.sigma_rad)) {
+// One picture whose reading measuring does not explain; some cannot be told apart.
+std::string WrongReading(const WrongTilt& wrong, const Placements& placements) {
+  const double off_deg = RadToDeg(wrong.off_rad);
+  const double sigma_deg = RadToDeg(wrong.sigma_rad);
+  const std::string& name = placements.placed[wrong.placement].name;
+  if (wrong.or_rather.empty()) {
+    return fmt::format(
+        "{}: the reading is {:.3f} degrees from where all other pictures put it, and measuring "
+        "explains {:.3f}",
+        name,
+        off_deg,
+        sigma_deg);
+  }
+  std::string names = name;
+  for (const std::size_t other : wrong.or_rather) names += ", " + placements.placed[other].name;
+  return fmt::format(
+      "{}: one of these readings is {:.3f} degrees off, and measuring explains {:.3f}",
+      names,
+      off_deg,
+      sigma_deg);
+}
+
+void Explain(const TiltRotationFailure& failure,
+             const Placements& placements,
+             const CalibrateTiltRequest& request,
+             const Console& console) {
+  std::string text = fmt::format("{}: no calibration: {} ({} placements",
+                                 request.folder,
+                                 MissingMotion(failure.fault),
+                                 placements.placed.size());
+  if (failure.fault == TiltRotationFault::kNoRotation) {
+    text += fmt::format(
+        ", which contradict one another {:.1f} times as much as --sigma-deg and the pictures "
+        "explain",
+        failure.sigma_factor);
+    // A grosser error turns the rotation so far that others look worst.
+    constexpr double kMostTold_deg = 5.0;
+    const WrongTilt& worst = failure.wrong[0];
+    if (RadToDeg(worst.off_rad) < kMostTold_deg) {
+      text += fmt::format(", {} most, by {:.3f} degrees",
+                          placements.placed[worst.placement].name,
+                          RadToDeg(worst.off_rad));
+    }
+  } else if (failure.fault == TiltRotationFault::kDoesNotFit) {
+    for (const WrongTilt& wrong : failure.wrong) {
+      Complain(console, request.folder + "/" + WrongReading(wrong, placements));
+    }
+  } else if (std::isfinite(failure.sigma_rad)) {
     text += fmt::format(", sigma would be {:.2f} degrees", RadToDeg(failure.sigma_rad));
   }
-  return text + ")";
+  Complain(console, text + ")");
+}
+
+void WarnOfScatter(const TiltResult& result,
+                   const CalibrateTiltRequest& request,
+                   const Console& console) {
+  const double factor = result.rotation.sigma_factor;
+  if (factor == 1.0) return;
+  Complain(console,
+           fmt::format("warning: {}: readings and pictures differ {:.1f} times as much as "
+                       "--sigma-deg and the board's residual explain; the sigma of the mounting is "
+                       "that much larger",
+                       request.folder,
+                       factor));
+}
+
+// What a rig file is to say of one reading.
+double LargestSigma_deg(const Placements& placements) {
+  double largest_rad = 0.0;
+  for (const Placed& one : placements.placed) {
+    largest_rad = std::max(largest_rad, one.tilt.sigma_rad);
+  }
+  return RadToDeg(largest_rad);
 }
 
 std::optional<TiltRotationOptions> Options(const CalibrateTiltRequest& request,
@@ -204,24 +270,27 @@ ExitCode RunCalibrateTilt(const CalibrateTiltRequest& request, const Console& co
   if (!boards) return ExitCode::kBadInput;
 
   const Placements placements = Place(*boards, *tilts, *board, *camera, console);
-  auto rotation = Solve(placements, *options, nullptr);
+  TiltRotationOptions roughly = *options;
+  roughly.takes_misfits = true;
+  auto rotation = Solve(placements, roughly, nullptr);
   if (rotation) {
     const TiltRotation first = *rotation;
     rotation = Solve(placements, *options, &first);
   }
   if (!rotation) {
-    Complain(console,
-             request.folder +
-                 ": no calibration: " + Explain(rotation.error(), placements.placed.size()));
+    Explain(rotation.error(), placements, request, console);
     return ExitCode::kBadInput;
   }
+  std::vector<std::string> names;
+  for (const Placed& one : placements.placed) names.push_back(one.name);
   const TiltResult result{*rotation,
-                          request.sigma_deg,
+                          LargestSigma_deg(placements),
                           request.sign,
-                          placements.placed.size(),
+                          std::move(names),
                           placements.residual_px,
                           *camera,
                           options->up_in_board.has_value()};
+  WarnOfScatter(result, request, console);
   if (const auto fault = out.Write(TiltYaml(result))) {
     Complain(console, *fault);
     return ExitCode::kBadInput;

@@ -62,6 +62,15 @@ std::size_t Readings(const TargetResult& result) {
       }));
 }
 
+// What a rig file is to say of one reading.
+double LargestTiltSigma_rad(const TargetResult& result) {
+  double largest_rad = 0.0;
+  for (const TargetPlacement& one : result.placements) {
+    if (one.up_in_housing) largest_rad = std::max(largest_rad, one.tilt_sigma_rad);
+  }
+  return largest_rad;
+}
+
 std::string MountingText(const TargetResult& result) {
   const TargetCalibration& found = result.found;
   if (!found.housing_from_target) {
@@ -72,12 +81,14 @@ std::string MountingText(const TargetResult& result) {
       RadToDeg(1.0) * found.mounting_covariance.diagonal().cwiseSqrt();
   return fmt::format(
       "R1, the mounting of the board's inclinometer, from {} readings: sigma {:.4f} / {:.4f} / "
-      "{:.4f} degrees about the board's x / y / z; of up on a level board {:.4f}\n",
+      "{:.4f} degrees about the board's x / y / z; of up on a level board {:.4f}; of one reading "
+      "{:.4g}, the largest that tilt.csv, or else --sigma-deg, says\n",
       Readings(result),
       sigma_deg.x(),
       sigma_deg.y(),
       sigma_deg.z(),
-      RadToDeg(MountingSigma_rad(found.mounting_covariance, *found.housing_from_target)));
+      RadToDeg(MountingSigma_rad(found.mounting_covariance, *found.housing_from_target)),
+      RadToDeg(LargestTiltSigma_rad(result)));
 }
 
 }  // namespace
@@ -105,6 +116,7 @@ std::string MissingForMounting(const TiltRotationFailure& failure, std::size_t r
              "of them" +
              sigma;
     case TiltRotationFault::kNoRotation:
+    case TiltRotationFault::kDoesNotFit:
       return "the readings contradict the points: see that each reading belongs to its placement, "
              "that the total station was levelled, and which way the angles count (--sign)";
   }
@@ -119,7 +131,7 @@ std::string TargetPartYaml(const TargetResult& result) {
     TiltMount mount;
     mount.tilt_from_body = *found.housing_from_target;
     mount.sign = {result.request.sign[0], result.request.sign[1]};
-    mount.sigma_rad = DegToRad(result.request.sigma_deg);
+    mount.sigma_rad = LargestTiltSigma_rad(result);
     mount.mounting_sigma_rad =
         MountingSigma_rad(found.mounting_covariance, *found.housing_from_target);
     text += "inclinometers:\n  target:\n" + TiltMountYaml(mount);
@@ -147,8 +159,10 @@ std::string TargetPartYaml(const TargetResult& result) {
           fmt::format("{:.6e}", per_rad * per_rad * found.mounting_covariance(i / 3, i % 3)));
     }
     text += fmt::format(
-        "  # of the turn that is still missing, about the target's axes\n  covariance_deg2: [{}]\n",
-        fmt::join(numbers, ", "));
+        "  # of the turn that is still missing, about the target's axes\n  covariance_deg2: [{}]\n"
+        "  mounting_factor: {:.4g}\n",
+        fmt::join(numbers, ", "),
+        found.mounting_factor);
   }
   return text;
 }
@@ -199,17 +213,18 @@ std::string TargetSummary(const TargetResult& result) {
 }
 
 std::string TargetCsv(const TargetResult& result) {
-  std::string text = "placement,led,off_x_mm,off_y_mm,off_z_mm,from_others_mm,misfit\n";
+  std::string text = "placement,led,off_x_mm,off_y_mm,off_z_mm,from_others_mm,misfit,controlled\n";
   for (const TargetSighting& sighting : result.found.sightings) {
     const Eigen::Vector3d off_mm = kMmPerMetre * sighting.off_in_site_m;
-    text += fmt::format("{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.3f}\n",
+    text += fmt::format("{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.3f},{}\n",
                         CsvField(result.files[sighting.placement]),
                         result.nominal[sighting.led].id,
                         off_mm.x(),
                         off_mm.y(),
                         off_mm.z(),
                         kMmPerMetre * sighting.from_others_m,
-                        sighting.misfit);
+                        sighting.misfit,
+                        sighting.controlled);
   }
   return text;
 }
@@ -247,6 +262,7 @@ std::string TargetJson(const TargetResult& result) {
       mounting["covariance_deg2"].push_back(RadToDeg(1.0) * RadToDeg(1.0) *
                                             found.mounting_covariance(i / 3, i % 3));
     }
+    mounting["sigma_factor"] = found.mounting_factor;
     mounting["mounting_sigma_deg"] =
         RadToDeg(MountingSigma_rad(found.mounting_covariance, *found.housing_from_target));
   }

@@ -27,7 +27,8 @@ std::string TargetSummary(const TargetResult& result);
 std::string TargetCsv(const TargetResult& result);
 std::string TargetJson(const TargetResult& result);
 
-// What the inclinometer lacks, as a motion to make; for kNoRotation, what contradicts.
+// What the inclinometer lacks, as a motion to make; for kNoRotation and kDoesNotFit, what
+// contradicts.
 std::string MissingForMounting(const TiltRotationFailure& failure, std::size_t readings);
 
 }  // namespace tbm

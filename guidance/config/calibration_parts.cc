@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 
 #include "guidance/config/camera_node.h"
+#include "pose/rig/camera_section.h"
 #include "pose/rig/rig_sections.h"
 #include "pose/rig/yaml_section.h"
 
@@ -108,15 +109,32 @@ void ReadMount(const YamlNode& root,
   node.Required("mounting_sigma_deg", "how well the rotation is known, per axis; 0 .. 10 deg");
 }
 
+// Keys that other programs put beside a camera are no harm here.
+void PassOver(const YamlNode&, const std::set<std::string_view>&) {}
+
+void ReadTiltCamera(const YamlNode& root, TiltPart* part) {
+  const YamlNode found_with = root.Optional("calibrated").Optional("camera");
+  const YamlNode own = root.Optional("camera");
+  const YamlNode& camera = found_with.exists() || !own.exists() ? found_with : own;
+  part->camera_key = camera.key();
+  part->camera_line = camera.line();
+  if (camera.IsMap()) {
+    ReadCameraModel(camera, PassOver, &part->camera);
+  } else if (camera.exists()) {
+    camera.Fault("must be a map with image_width, image_height, camera_matrix, ..");
+  } else {
+    camera.Fault(
+        "missing; a rotation belongs to the camera it was found with, and is wrong with another: "
+        "run tbm calibrate tilt, which writes it down, or copy the `camera:` section of that "
+        "camera's file into this one");
+  }
+}
+
 TiltPart ReadTiltPart(const YamlNode& root) {
   TiltPart part;
   if (!IsMap(root, "`inclinometers:`, as tbm calibrate tilt writes it")) return part;
   ReadMount(root, "camera", "with `camera`, which tbm calibrate tilt finds", &part.mount);
-  const YamlNode camera_px = root.Optional("calibrated").Optional("camera_px");
-  part.camera_px_line = camera_px.line();
-  if (const auto numbers = camera_px.Numbers(4, {0.0, 1e6, "px"})) {
-    part.camera_px = Eigen::Vector4d((*numbers)[0], (*numbers)[1], (*numbers)[2], (*numbers)[3]);
-  }
+  ReadTiltCamera(root, &part);
   return part;
 }
 

@@ -30,8 +30,11 @@ Result<CameraPart, RigFileFaults> LoadCameraPart(const std::string& path);
 // What `tbm calibrate tilt` writes: inclinometers.camera.
 struct TiltPart {
   TiltMount mount;
-  std::optional<Eigen::Vector4d> camera_px;  // fx fy cx cy of the camera it was found with
-  int camera_px_line = 0;                    // in the file
+  // That the rotation was found with, and belongs to: `calibrated.camera`, or in a whole rig file
+  // its own. A file with neither is refused.
+  CameraModel camera;
+  std::string camera_key;
+  int camera_line = 0;
 };
 Result<TiltPart, RigFileFaults> ParseTiltPart(std::string_view yaml, const std::string& file);
 Result<TiltPart, RigFileFaults> LoadTiltPart(const std::string& path);

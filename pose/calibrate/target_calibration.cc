@@ -5,26 +5,18 @@
 #include <utility>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "pose/calibrate/misfit.h"
 #include "pose/calibrate/target_fit.h"
 
 namespace tbm {
 namespace {
 
 constexpr int kIterations = 20;
-// Three coordinates of one point: once in 70 000 by chance.
-constexpr double kMostMisfit = 25.0;
-// An error of a point shows by less than this share in its residual: nothing controls it.
-constexpr double kLeastControl = 0.02;
-
-// chi2 over its degrees of freedom where that is more than chance, else 1.
-double Factor2(double chi2, int dof) {
-  if (dof <= 0) return 1.0;
-  const double ratio = chi2 / dof;
-  return ratio > 1.0 + 3.0 * std::sqrt(2.0 / dof) ? ratio : 1.0;
-}
+// What is left of the weight of a point that is left out. Not 0: without it a placement may have
+// fewer LEDs than it takes.
+constexpr double kLeftOut = 1e-6;
 
 // Unknowns: three for each LED, then turn (about the site's axes) and shift for each placement.
 class Adjustment {
@@ -35,36 +27,62 @@ class Adjustment {
       : nominal_(nominal_m),
         placements_(placements),
         leds_(nominal_m.begin(), nominal_m.end()),
-        site_from_target_(std::move(site_from_target)) {}
+        site_from_target_(std::move(site_from_target)) {
+    for (std::size_t i = 0; i < placements.size(); ++i) {
+      for (std::size_t j = 0; j < leds_.size(); ++j) {
+        if (placements[i].led_in_site_m[j]) points_.push_back({i, j});
+      }
+    }
+  }
 
-  void Solve() {
+  const std::vector<TargetPoint>& points() const { return points_; }
+  double SigmaOf(const TargetPoint& point) const { return placements_[point.placement].sigma_m; }
+
+  void Solve(const std::vector<bool>& is_out) {
+    is_out_ = is_out;
     for (int i = 0; i < kIterations; ++i) {
       Fill();
       const Eigen::VectorXd step = information_.ldlt().solve(pull_);
       Move(step);
-      if (step.norm() < 1e-14) break;
+      if (step.norm() < 1e-11) break;
     }
     Fill();
     spread_ = information_.inverse();
   }
 
+  AdjustedFit Fit() const {
+    AdjustedFit fit;
+    double dof = 0.0;
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+      const Eigen::Matrix3d control = Control(k);
+      const Eigen::Vector3d off_sigmas = Off(points_[k]) / SigmaOf(points_[k]);
+      fit.misfits.push_back(MisfitOf(control, off_sigmas));
+      if (is_out_[k]) continue;
+      fit.chi2 += off_sigmas.squaredNorm();
+      dof += control.trace();
+    }
+    fit.dof = static_cast<int>(std::lround(dof));
+    return fit;
+  }
+
   TargetCalibration Found() const {
+    const AdjustedFit fit = Fit();
     TargetCalibration result;
     result.led_in_target_m = leds_;
     result.site_from_target = site_from_target_;
-    for (std::size_t i = 0; i < placements_.size(); ++i) {
-      for (std::size_t j = 0; j < leds_.size(); ++j) {
-        if (!placements_[i].led_in_site_m[j]) continue;
-        result.sightings.push_back(Sighting(i, j));
-        const double sigmas = result.sightings.back().off_in_site_m.norm() / placements_[i].sigma_m;
-        result.chi2 += sigmas * sigmas;
-      }
+    result.chi2 = fit.chi2;
+    result.dof = fit.dof;
+    result.sigma_factor = ScatterFactor(fit.chi2, fit.dof);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+      const auto& [i, j] = points_[k];
+      const Misfit& misfit = fit.misfits[k];
+      result.sightings.push_back({i,
+                                  j,
+                                  Off(points_[k]),
+                                  misfit.chi2,
+                                  misfit.dof,
+                                  misfit.from_others_sigmas * SigmaOf(points_[k])});
     }
-    // Six of the unknowns are the frame, which the constraints hold.
-    result.dof =
-        static_cast<int>(3 * result.sightings.size() - 3 * leds_.size() - 6 * placements_.size()) +
-        6;
-    result.sigma_factor = std::sqrt(Factor2(result.chi2, result.dof));
     for (std::size_t j = 0; j < leds_.size(); ++j) {
       const Eigen::Index row = LedAt(j);
       result.led_sigma_m.push_back(result.sigma_factor *
@@ -85,7 +103,13 @@ class Adjustment {
     return static_cast<Eigen::Index>(3 * leds_.size() + 6 * i);
   }
 
-  Eigen::Matrix<double, 3, 6> ByPlacement(std::size_t i, std::size_t j) const {
+  Eigen::Vector3d Off(const TargetPoint& point) const {
+    const auto& [i, j] = point;
+    return *placements_[i].led_in_site_m[j] - site_from_target_[i] * leds_[j];
+  }
+
+  Eigen::Matrix<double, 3, 6> ByPlacement(const TargetPoint& point) const {
+    const auto& [i, j] = point;
     Eigen::Matrix<double, 3, 6> by_placement;
     by_placement.leftCols<3>() = -Skew(site_from_target_[i].rotation * leds_[j]);
     by_placement.rightCols<3>().setIdentity();
@@ -94,33 +118,22 @@ class Adjustment {
 
   // Which share of an error of this point shows in its residual: one less what the point itself
   // says of the unknowns.
-  Eigen::Matrix3d Control(std::size_t i, std::size_t j) const {
-    const Eigen::Index l = LedAt(j);
-    const Eigen::Index p = PlacementAt(i);
-    const Eigen::Matrix3d by_led = site_from_target_[i].rotation.toRotationMatrix();
-    const Eigen::Matrix<double, 3, 6> by_placement = ByPlacement(i, j);
+  Eigen::Matrix3d Control(std::size_t k) const {
+    const TargetPoint& point = points_[k];
+    const Eigen::Index l = LedAt(point.led);
+    const Eigen::Index p = PlacementAt(point.placement);
+    const Eigen::Matrix3d by_led = site_from_target_[point.placement].rotation.toRotationMatrix();
+    const Eigen::Matrix<double, 3, 6> by_placement = ByPlacement(point);
     const Eigen::Matrix3d mixed = by_led * spread_.block<3, 6>(l, p) * by_placement.transpose();
     const Eigen::Matrix3d adjusted =
         by_led * spread_.block<3, 3>(l, l) * by_led.transpose() + mixed + mixed.transpose() +
         by_placement * spread_.block<6, 6>(p, p) * by_placement.transpose();
-    const double sigma_m = placements_[i].sigma_m;
-    return Eigen::Matrix3d::Identity() - adjusted / (sigma_m * sigma_m);
+    return Eigen::Matrix3d::Identity() - WeightOf(k) * adjusted;
   }
 
-  TargetSighting Sighting(std::size_t i, std::size_t j) const {
-    TargetSighting sighting{i, j, Off(i, j), 0.0, 0.0};
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> control(Control(i, j));
-    if (control.eigenvalues()[0] < kLeastControl) return sighting;
-    const Eigen::Vector3d along = control.eigenvectors().transpose() * sighting.off_in_site_m;
-    const double sigma_m = placements_[i].sigma_m;
-    sighting.misfit =
-        along.cwiseAbs2().cwiseQuotient(control.eigenvalues()).sum() / (sigma_m * sigma_m);
-    sighting.from_others_m = along.cwiseQuotient(control.eigenvalues()).norm();
-    return sighting;
-  }
-
-  Eigen::Vector3d Off(std::size_t i, std::size_t j) const {
-    return *placements_[i].led_in_site_m[j] - site_from_target_[i] * leds_[j];
+  double WeightOf(std::size_t k) const {
+    const double sigma_m = SigmaOf(points_[k]);
+    return (is_out_[k] ? kLeftOut : 1.0) / (sigma_m * sigma_m);
   }
 
   void Fill() {
@@ -128,24 +141,22 @@ class Adjustment {
     information_ = Eigen::MatrixXd::Zero(size, size);
     pull_ = Eigen::VectorXd::Zero(size);
     double largest_weight = 0.0;
-    for (std::size_t i = 0; i < placements_.size(); ++i) {
-      const double weight = 1.0 / (placements_[i].sigma_m * placements_[i].sigma_m);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+      const double weight = WeightOf(k);
       largest_weight = std::max(largest_weight, weight);
+      const auto& [i, j] = points_[k];
       const Eigen::Matrix3d rotation = site_from_target_[i].rotation.toRotationMatrix();
+      const Eigen::Index l = LedAt(j);
       const Eigen::Index p = PlacementAt(i);
-      for (std::size_t j = 0; j < leds_.size(); ++j) {
-        if (!placements_[i].led_in_site_m[j]) continue;
-        const Eigen::Index l = LedAt(j);
-        const Eigen::Matrix<double, 3, 6> by_placement = ByPlacement(i, j);
-        const Eigen::Vector3d off = Off(i, j);
-        information_.block<3, 3>(l, l) += weight * Eigen::Matrix3d::Identity();
-        information_.block<6, 6>(p, p) += weight * by_placement.transpose() * by_placement;
-        const Eigen::Matrix<double, 3, 6> mixed = weight * rotation.transpose() * by_placement;
-        information_.block<3, 6>(l, p) += mixed;
-        information_.block<6, 3>(p, l) += mixed.transpose();
-        pull_.segment<3>(l) += weight * rotation.transpose() * off;
-        pull_.segment<6>(p) += weight * by_placement.transpose() * off;
-      }
+      const Eigen::Matrix<double, 3, 6> by_placement = ByPlacement(points_[k]);
+      const Eigen::Vector3d off = Off(points_[k]);
+      information_.block<3, 3>(l, l) += weight * Eigen::Matrix3d::Identity();
+      information_.block<6, 6>(p, p) += weight * by_placement.transpose() * by_placement;
+      const Eigen::Matrix<double, 3, 6> mixed = weight * rotation.transpose() * by_placement;
+      information_.block<3, 6>(l, p) += mixed;
+      information_.block<6, 3>(p, l) += mixed.transpose();
+      pull_.segment<3>(l) += weight * rotation.transpose() * off;
+      pull_.segment<6>(p) += weight * by_placement.transpose() * off;
     }
     HoldFrame(largest_weight);
   }
@@ -179,31 +190,46 @@ class Adjustment {
   std::span<const TargetPlacement> placements_;
   std::vector<Eigen::Vector3d> leds_;
   std::vector<Rigid3> site_from_target_;
+  std::vector<TargetPoint> points_;
+  std::vector<bool> is_out_;  // side by side with these
   Eigen::MatrixXd information_;
   Eigen::MatrixXd spread_;
   Eigen::VectorXd pull_;
 };
 
-// The point that does not belong to the others, if there is one.
-std::optional<TargetCalibrationFailure> Outlier(const TargetCalibration& found) {
+// Why the points contradict one another, if they do; the adjustment is left as it comes.
+std::optional<TargetCalibrationFailure> Contradiction(Adjustment* adjustment) {
+  const std::vector<TargetPoint>& points = adjustment->points();
+  const std::vector<WrongMeasurement> wrong =
+      FindWrong(points.size(), [&](const std::vector<bool>& is_out) {
+        adjustment->Solve(is_out);
+        return adjustment->Fit();
+      });
+  if (wrong.empty()) return {};
+  TargetCalibrationFailure failure;
+  failure.fault = TargetCalibrationFault::kDoesNotFit;
+  for (const WrongMeasurement& one : wrong) {
+    const TargetPoint& point = points[one.which];
+    failure.wrong.push_back(
+        {point, one.misfit.from_others_sigmas * adjustment->SigmaOf(point), {}});
+    for (const std::size_t other : one.or_rather) {
+      failure.wrong.back().or_rather.push_back(points[other]);
+    }
+  }
+  return failure;
+}
+
+// None of them to blame, and more than any total station does.
+std::optional<TargetCalibrationFailure> Scatter(const TargetCalibration& found) {
+  if (!IsBeyondScatter(found.chi2, found.dof)) return {};
   const auto worst = std::max_element(
       found.sightings.begin(),
       found.sightings.end(),
       [](const TargetSighting& a, const TargetSighting& b) { return a.misfit < b.misfit; });
-  // Where all points scatter more than was declared, it is the declaration that is wrong.
-  const double rest = Factor2(found.chi2 - worst->misfit, found.dof - 3);
-  if (!(worst->misfit > kMostMisfit * rest)) return {};
   TargetCalibrationFailure failure;
-  failure.fault = TargetCalibrationFault::kDoesNotFit;
-  failure.led = worst->led;
-  failure.placement = worst->placement;
-  failure.off_m = worst->from_others_m;
-  for (const TargetSighting& other : found.sightings) {
-    const bool is_as_bad = other.misfit > worst->misfit - 1.0;
-    if (other.led == worst->led && other.placement != worst->placement && is_as_bad) {
-      failure.or_placement = other.placement;
-    }
-  }
+  failure.fault = TargetCalibrationFault::kScatters;
+  failure.wrong = {{{worst->placement, worst->led}, worst->from_others_m, {}}};
+  failure.sigma_factor = found.sigma_factor;
   return failure;
 }
 
@@ -212,6 +238,7 @@ void FindMounting(std::span<const TargetPlacement> placements,
                   const Adjustment& adjustment,
                   TargetCalibration* result) {
   std::vector<TiltPlacement> tilted;
+  std::vector<std::size_t> which;
   for (std::size_t i = 0; i < placements.size(); ++i) {
     if (!placements[i].up_in_housing) continue;
     TiltPlacement one;
@@ -220,16 +247,22 @@ void FindMounting(std::span<const TargetPlacement> placements,
     one.tilt_sigma_rad = placements[i].tilt_sigma_rad;
     one.camera_sigma_rad = result->sigma_factor * adjustment.UpSigma_rad(i);
     tilted.push_back(one);
+    which.push_back(i);
   }
   TiltRotationOptions options;
   options.up_in_board = Eigen::Vector3d::UnitZ();
   const auto rotation = FindTiltRotation(tilted, options);
   if (!rotation) {
     result->mounting_missing = rotation.error();
+    for (WrongTilt& wrong : result->mounting_missing->wrong) {
+      wrong.placement = which[wrong.placement];
+      for (std::size_t& other : wrong.or_rather) other = which[other];
+    }
     return;
   }
   result->housing_from_target = rotation->camera_from_housing.transpose();
-  result->mounting_covariance = Factor2(rotation->chi2, rotation->dof) * rotation->covariance;
+  result->mounting_covariance = rotation->covariance;
+  result->mounting_factor = rotation->sigma_factor;
 }
 
 std::optional<TargetCalibrationFailure> Unmeasured(std::size_t leds,
@@ -260,17 +293,17 @@ Result<TargetCalibration, TargetCalibrationFailure> CalibrateTarget(
     if (!start) {
       TargetCalibrationFailure failure = start.error();
       failure.placement = i;
+      for (WrongTargetPoint& wrong : failure.wrong) wrong.point.placement = i;
       return Failure{std::move(failure)};
     }
     starts.push_back(*start);
   }
   if (const auto failure = Unmeasured(nominal_m.size(), placements)) return Failure{*failure};
   Adjustment adjustment(nominal_m, placements, std::move(starts));
-  adjustment.Solve();
+  if (auto failure = Contradiction(&adjustment)) return Failure{std::move(*failure)};
+  adjustment.Solve(std::vector<bool>(adjustment.points().size(), false));
   TargetCalibration result = adjustment.Found();
-  if (result.dof > 0) {
-    if (const auto outlier = Outlier(result)) return Failure{*outlier};
-  }
+  if (auto failure = Scatter(result)) return Failure{std::move(*failure)};
   FindMounting(placements, adjustment, &result);
   return result;
 }

@@ -137,8 +137,7 @@ TargetCalibrationFailure WhyNot(const Order& leds,
   }
   if (const auto lonely = LonelyPoint(from, to, most_off_m)) {
     failure.fault = TargetCalibrationFault::kDoesNotFit;
-    failure.led = leds[lonely->first];
-    failure.off_m = lonely->second;
+    failure.wrong = {{{0, leds[lonely->first]}, lonely->second, {}}};
     return failure;
   }
   failure.fault = TargetCalibrationFault::kOtherBoard;

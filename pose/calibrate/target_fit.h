@@ -12,6 +12,7 @@
 namespace tbm {
 
 // Where the board stood in one placement, from its LEDs' nominal places alone: site_from_target.
+// Which placement that is the caller knows: failures say 0.
 // What does not fit within `most_off_m` is looked into: names exchanged (all orders of up to seven
 // LEDs are tried, pairs of more), a mirror image, one LED alone, another board. An exchange that is
 // a turn of the whole board cannot be seen.

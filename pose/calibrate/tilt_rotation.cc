@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -10,6 +11,7 @@
 #include <Eigen/SVD>
 
 #include "pose/base/angle.h"
+#include "pose/calibrate/misfit.h"
 #include "pose/geometry/rigid3.h"
 
 namespace tbm {
@@ -27,6 +29,8 @@ const double kLeastTilt_rad = DegToRad(0.5);
 const double kLeastYaw_rad = DegToRad(20.0);
 constexpr int kMostSteps = 200;
 constexpr int kRefinements = 30;
+// By this the sigmas of a placement that is left out grow.
+constexpr double kLeftOut = 1e3;
 
 // vec() by columns, as in the paper's Kronecker products.
 Eigen::Matrix3d MatrixOf(const Vector9& v) { return Eigen::Map<const Eigen::Matrix3d>(v.data()); }
@@ -76,41 +80,131 @@ Eigen::Vector3d MeanUp(std::span<const TiltPlacement> placements, const Eigen::M
   return sum.normalized();
 }
 
-// The normal equations of rotation (3, about the camera's axes) and up (2, tangents of it).
-struct Normal {
-  Matrix5 information = Matrix5::Zero();
-  Vector5 pull = Vector5::Zero();
-  double chi2 = 0.0;
+using ByUnknowns = Eigen::Matrix<double, 2, 5>;
+
+// One placement's two residuals: felt less seen, across the up that is seen.
+struct Equation {
+  Eigen::Vector2d off;
+  ByUnknowns by;
+  double sigma_rad = 0.0;
 };
 
-Normal NormalOf(std::span<const TiltPlacement> placements,
-                const Eigen::Matrix3d& rotation,
-                const Eigen::Vector3d& up_in_board,
-                const TiltRotationOptions& options) {
-  Normal normal;
-  const Eigen::Matrix<double, 3, 2> tangents = TangentsOf(up_in_board);
-  for (const TiltPlacement& one : placements) {
-    const Eigen::Vector3d seen = one.camera_from_board * up_in_board;
-    const Eigen::Vector3d felt = rotation * one.up_in_housing;
+// Unknowns: turn of the rotation (3, about the camera's axes) and up (2, along its tangents).
+class TiltAdjustment {
+ public:
+  TiltAdjustment(std::span<const TiltPlacement> placements,
+                 const TiltRotationOptions& options,
+                 const TiltRotation& start)
+      : placements_(placements),
+        options_(options),
+        rotation_(start.camera_from_housing),
+        up_(start.up_in_board),
+        is_out_(placements.size(), false) {}
+
+  // False where the placements do not tell the unknowns.
+  bool Solve(const std::vector<bool>& is_out) {
+    is_out_ = is_out;
+    for (int i = 0; i < kRefinements; ++i) {
+      Fill();
+      const Vector5 e = information_.ldlt().solve(pull_);
+      if (!e.allFinite()) return false;
+      const Eigen::Vector3d turn = e.head<3>();
+      rotation_ = ExpRotation(turn).toRotationMatrix() * rotation_;
+      up_ = (up_ + TangentsOf(up_) * e.tail<2>()).normalized();
+      if (e.norm() < 1e-13) break;
+    }
+    Fill();
+    spread_ = information_.inverse();
+    return true;
+  }
+  bool SolveAll() { return Solve(std::vector<bool>(placements_.size(), false)); }
+
+  AdjustedFit Fit() const {
+    AdjustedFit fit;
+    fit.chi2 = chi2_;
+    fit.dof = 2 * static_cast<int>(placements_.size()) - (options_.up_in_board ? 3 : 5);
+    for (std::size_t i = 0; i < placements_.size(); ++i) {
+      const Equation equation = EquationOf(i);
+      const double weight = 1.0 / (equation.sigma_rad * equation.sigma_rad);
+      const Eigen::Matrix2d control =
+          Eigen::Matrix2d::Identity() - weight * equation.by * spread_ * equation.by.transpose();
+      fit.misfits.push_back(MisfitOf(control, equation.off / equation.sigma_rad));
+      if (is_out_[i]) fit.dof -= fit.misfits.back().dof;
+    }
+    return fit;
+  }
+
+  TiltRotation Found(int steps) const {
+    const AdjustedFit fit = Fit();
+    TiltRotation found;
+    found.camera_from_housing = rotation_;
+    found.covariance = spread_.topLeftCorner<3, 3>();
+    found.up_in_board = up_;
+    if (!options_.up_in_board) {
+      const Eigen::Matrix2d up = spread_.bottomRightCorner<2, 2>();
+      found.up_sigma_rad = std::sqrt(up.eigenvalues().real().maxCoeff());
+    }
+    found.chi2 = fit.chi2;
+    found.dof = fit.dof;
+    found.steps = steps;
+    for (std::size_t i = 0; i < placements_.size(); ++i) {
+      const Equation equation = EquationOf(i);
+      const Misfit& misfit = fit.misfits[i];
+      found.readings.push_back({equation.off.norm(),
+                                equation.sigma_rad,
+                                misfit.chi2,
+                                misfit.dof,
+                                misfit.from_others_sigmas * equation.sigma_rad});
+    }
+    return found;
+  }
+
+ private:
+  Equation EquationOf(std::size_t i) const {
+    const TiltPlacement& one = placements_[i];
+    const Eigen::Vector3d seen = one.camera_from_board * up_;
+    const Eigen::Vector3d felt = rotation_ * one.up_in_housing;
     const Eigen::Matrix<double, 3, 2> plane = TangentsOf(seen);
-    const double weight = 1.0 / (one.camera_sigma_rad * one.camera_sigma_rad +
-                                 one.tilt_sigma_rad * one.tilt_sigma_rad);
-    Eigen::Matrix<double, 2, 5> by;
-    by.leftCols<3>() = plane.transpose() * -Skew(felt);
-    by.rightCols<2>() = -plane.transpose() * one.camera_from_board * tangents;
-    const Eigen::Vector2d residual = plane.transpose() * (felt - seen);
-    normal.information += weight * by.transpose() * by;
-    normal.pull -= weight * by.transpose() * residual;
-    normal.chi2 += weight * residual.squaredNorm();
+    Equation equation;
+    equation.off = plane.transpose() * (felt - seen);
+    equation.by.leftCols<3>() = plane.transpose() * -Skew(felt);
+    equation.by.rightCols<2>() = -plane.transpose() * one.camera_from_board * TangentsOf(up_);
+    equation.sigma_rad =
+        (is_out_[i] ? kLeftOut : 1.0) * std::hypot(one.camera_sigma_rad, one.tilt_sigma_rad);
+    return equation;
   }
-  if (options.up_in_board) {
-    const double sigma = std::max(options.up_sigma_rad, 1e-9);
-    const Eigen::Vector2d off = tangents.transpose() * (*options.up_in_board - up_in_board);
-    normal.information.bottomRightCorner<2, 2>() += Eigen::Matrix2d::Identity() / (sigma * sigma);
-    normal.pull.tail<2>() += off / (sigma * sigma);
+
+  void Fill() {
+    information_.setZero();
+    pull_.setZero();
+    chi2_ = 0.0;
+    for (std::size_t i = 0; i < placements_.size(); ++i) {
+      const Equation equation = EquationOf(i);
+      const double weight = 1.0 / (equation.sigma_rad * equation.sigma_rad);
+      information_ += weight * equation.by.transpose() * equation.by;
+      pull_ -= weight * equation.by.transpose() * equation.off;
+      chi2_ += is_out_[i] ? 0.0 : weight * equation.off.squaredNorm();
+    }
+    if (options_.up_in_board) {
+      const double sigma = std::max(options_.up_sigma_rad, 1e-9);
+      const Eigen::Vector2d off =
+          TangentsOf(up_).transpose() * (*options_.up_in_board - up_) / sigma;
+      information_.bottomRightCorner<2, 2>() += Eigen::Matrix2d::Identity() / (sigma * sigma);
+      pull_.tail<2>() += off / sigma;
+      chi2_ += off.squaredNorm();
+    }
   }
-  return normal;
-}
+
+  std::span<const TiltPlacement> placements_;
+  const TiltRotationOptions& options_;
+  Eigen::Matrix3d rotation_;
+  Eigen::Vector3d up_;
+  std::vector<bool> is_out_;
+  Matrix5 information_ = Matrix5::Zero();
+  Matrix5 spread_ = Matrix5::Zero();
+  Vector5 pull_ = Vector5::Zero();
+  double chi2_ = 0.0;
+};
 
 // Which motion the placements lack, judged by what the sensors saw.
 std::optional<TiltRotationFault> MissingIn(std::span<const TiltPlacement> placements,
@@ -150,7 +244,58 @@ double YawSpread_rad(std::span<const TiltPlacement> placements,
 
 TiltRotationFailure FailureOf(TiltRotationFault fault,
                               double sigma_rad = std::numeric_limits<double>::quiet_NaN()) {
-  return {fault, sigma_rad};
+  return {fault, sigma_rad, {}, 1.0};
+}
+
+double Sigma_rad(const TiltRotation& found) {
+  return std::sqrt(found.covariance.eigenvalues().real().maxCoeff());
+}
+
+// Why the placements contradict one another, if they do. `found` is of all of them.
+std::optional<TiltRotationFailure> Contradiction(TiltAdjustment adjustment,
+                                                 const TiltRotation& found) {
+  TiltRotationFailure failure = FailureOf(TiltRotationFault::kDoesNotFit, Sigma_rad(found));
+  const std::vector<TiltReading>& readings = found.readings;
+  const auto add = [&](std::size_t i, double off_rad, std::vector<std::size_t> or_rather) {
+    failure.wrong.push_back({i, off_rad, readings[i].sigma_rad, std::move(or_rather)});
+  };
+  const auto fit = [&](const std::vector<bool>& is_out) {
+    const bool is_solved = adjustment.Solve(is_out);
+    return is_solved ? adjustment.Fit() : AdjustedFit{std::vector<Misfit>(readings.size()), 0.0, 0};
+  };
+  // A placement's sigma is the mean of two directions.
+  constexpr double kSlack = 2.0;
+  const auto wrong = FindWrong(readings.size(), fit, kSlack);
+  for (const WrongMeasurement& one : wrong) {
+    add(one.which, one.misfit.from_others_sigmas * readings[one.which].sigma_rad, one.or_rather);
+  }
+  if (!wrong.empty()) return failure;
+  if (!IsBeyondScatter(found.chi2, found.dof)) return {};
+  failure.fault = TiltRotationFault::kNoRotation;
+  failure.sigma_factor = ScatterFactor(found.chi2, found.dof);
+  const auto worst = std::max_element(
+      readings.begin(), readings.end(), [](const TiltReading& a, const TiltReading& b) {
+        return a.misfit < b.misfit;
+      });
+  add(static_cast<std::size_t>(worst - readings.begin()), worst->from_others_rad, {});
+  return failure;
+}
+
+void Scale(TiltRotation* found) {
+  found->sigma_factor = ScatterFactor(found->chi2, found->dof);
+  found->covariance *= found->sigma_factor * found->sigma_factor;
+  found->up_sigma_rad *= found->sigma_factor;
+}
+
+// Empty where the sigma is small enough.
+std::optional<TiltRotationFailure> Weakness(const TiltRotation& found,
+                                            std::span<const TiltPlacement> placements,
+                                            const TiltRotationOptions& options) {
+  const double sigma_rad = Sigma_rad(found);
+  if (sigma_rad <= options.most_sigma_rad) return {};
+  const bool lacks_yaw =
+      !options.up_in_board && YawSpread_rad(placements, found.up_in_board) < kLeastYaw_rad;
+  return FailureOf(lacks_yaw ? TiltRotationFault::kNoYaw : TiltRotationFault::kTooWeak, sigma_rad);
 }
 
 }  // namespace
@@ -172,6 +317,9 @@ const char* MissingMotion(TiltRotationFault fault) {
     case TiltRotationFault::kNoRotation:
       return "do not move the board between the pictures, and see that each reading belongs to its "
              "picture";
+    case TiltRotationFault::kDoesNotFit:
+      return "see that each reading belongs to its picture, and that nothing moved while it was "
+             "taken; take it again, or take the row out";
   }
   return "";
 }
@@ -228,49 +376,26 @@ Result<TiltRotation, TiltRotationFailure> FindTiltRotation(
   if (placements.size() < (up_is_given ? kLeastKnownUp : kLeastPlacements)) {
     return Failure{FailureOf(TiltRotationFault::kTooFew)};
   }
-  TiltRotation found;
+  TiltRotation start;
   if (up_is_given) {
-    found.camera_from_housing = KnownUpTiltRotation(placements, *options.up_in_board);
-    found.up_in_board = *options.up_in_board;
+    start.camera_from_housing = KnownUpTiltRotation(placements, *options.up_in_board);
+    start.up_in_board = *options.up_in_board;
   } else {
-    found.camera_from_housing =
-        AugmentedLagrangianTiltRotation(placements, StartTiltRotation(placements), &found.steps);
-    found.up_in_board = MeanUp(placements, found.camera_from_housing);
+    start.camera_from_housing =
+        AugmentedLagrangianTiltRotation(placements, StartTiltRotation(placements), &start.steps);
+    start.up_in_board = MeanUp(placements, start.camera_from_housing);
   }
   if (const auto missing = MissingIn(placements, up_is_given)) {
     return Failure{FailureOf(*missing)};
   }
-  Normal normal;
-  for (int i = 0; i < kRefinements; ++i) {
-    normal = NormalOf(placements, found.camera_from_housing, found.up_in_board, options);
-    const Vector5 e = normal.information.ldlt().solve(normal.pull);
-    if (!e.allFinite()) return Failure{FailureOf(TiltRotationFault::kTooWeak)};
-    const Eigen::Vector3d turn = e.head<3>();
-    found.camera_from_housing = ExpRotation(turn).toRotationMatrix() * found.camera_from_housing;
-    found.up_in_board =
-        (found.up_in_board + TangentsOf(found.up_in_board) * e.tail<2>()).normalized();
-    if (e.norm() < 1e-13) break;
-  }
-  const Matrix5 spread = normal.information.inverse();
-  found.covariance = spread.topLeftCorner<3, 3>();
-  found.chi2 = normal.chi2;
-  found.dof = 2 * static_cast<int>(placements.size()) - (up_is_given ? 3 : 5);
-  if (!up_is_given) {
-    const Eigen::Matrix2d up = spread.bottomRightCorner<2, 2>();
-    found.up_sigma_rad = std::sqrt(up.eigenvalues().real().maxCoeff());
-  }
-  const double sigma_rad = std::sqrt(found.covariance.eigenvalues().real().maxCoeff());
-  if (!(sigma_rad <= options.most_sigma_rad)) {
-    const bool lacks_yaw =
-        !up_is_given && YawSpread_rad(placements, found.up_in_board) < kLeastYaw_rad;
-    return Failure{
-        FailureOf(lacks_yaw ? TiltRotationFault::kNoYaw : TiltRotationFault::kTooWeak, sigma_rad)};
-  }
-  // Twelve pictures that agree are near one; a board that moved is far beyond any sigma.
-  constexpr double kMostChi2PerDof = 25.0;
-  if (found.dof > 0 && found.chi2 > kMostChi2PerDof * found.dof) {
-    return Failure{FailureOf(TiltRotationFault::kNoRotation, sigma_rad)};
-  }
+  TiltAdjustment adjustment(placements, options, start);
+  if (!adjustment.SolveAll()) return Failure{FailureOf(TiltRotationFault::kTooWeak)};
+  TiltRotation found = adjustment.Found(start.steps);
+  if (auto weakness = Weakness(found, placements, options)) return Failure{std::move(*weakness)};
+  if (options.takes_misfits) return found;
+  if (auto failure = Contradiction(adjustment, found)) return Failure{std::move(*failure)};
+  Scale(&found);
+  if (auto weakness = Weakness(found, placements, options)) return Failure{std::move(*weakness)};
   return found;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -16,6 +17,7 @@
 #include <gtest/gtest.h>
 
 #include "guidance/app/calibrate_input.h"
+#include "guidance/config/calibration_parts.h"
 #include "guidance/config/camera_file.h"
 #include "pose/base/angle.h"
 #include "pose/calibrate/view_fit.h"
@@ -307,6 +309,98 @@ TEST_F(CalibrateTilt, GravityThatIsKnownMakesItBetterAndSignsAreTaken) {
   const Eigen::AngleAxisd off(Eigen::Matrix3d(loaded->rig.camera_tilt.tilt_from_body *
                                               test::TiltingTable::FloorCameraFromHousing()));
   EXPECT_LT(RadToDeg(std::abs(off.angle())), 0.06);
+}
+
+// tilt.csv with each angle off by what `by_deg` says for its row.
+std::string Retyped(const std::string& csv, const std::function<double(std::size_t)>& by_deg) {
+  std::string text;
+  const auto rows = test::Rows(csv);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto angle = [&](std::size_t column) {
+      return i == 0 ? rows[i][column] : fmt::format("{}", std::stod(rows[i][column]) + by_deg(i));
+    };
+    text += fmt::format("{},{},{}\n", rows[i][0], angle(1), angle(2));
+  }
+  return text;
+}
+
+TEST_F(CalibrateTilt, ReadingsWorseThanDeclaredMakeTheSigmaLargerAndAreRefusedBeyondThreeTimes) {
+  ASSERT_EQ(Ran(RunCalibrateTilt, Request()).code, ExitCode::kDone);
+  const TiltMount honest = RigWith(ReadText(Request().out))->rig.camera_tilt;
+  Random random("readings worse than declared");
+  const auto noisy = [&](double sigma_deg) {
+    return With(Retyped(Csv(), [&](std::size_t) { return random.Normal(sigma_deg); }));
+  };
+  auto request = noisy(0.03);
+  request.force = true;
+  const Outcome outcome = Ran(RunCalibrateTilt, request);
+  ASSERT_EQ(outcome.code, ExitCode::kDone) << outcome.err;
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("warning: "), HasSubstr("times as much as --sigma-deg")));
+  const TiltMount scaled = RigWith(ReadText(request.out))->rig.camera_tilt;
+  EXPECT_GT(scaled.mounting_sigma_rad, 1.5 * honest.mounting_sigma_rad);
+  const Eigen::AngleAxisd off(
+      Eigen::Matrix3d(scaled.tilt_from_body * test::TiltingTable::FloorCameraFromHousing()));
+  EXPECT_LT(std::abs(off.angle()), 4.0 * scaled.mounting_sigma_rad);
+  auto bad = noisy(0.3);
+  bad.out = folder_ / "bad.yaml";
+  const Outcome refused = Ran(RunCalibrateTilt, bad);
+  EXPECT_EQ(refused.code, ExitCode::kBadInput);
+  EXPECT_THAT(refused.err,
+              AllOf(HasSubstr("no calibration"), HasSubstr("times as much as --sigma-deg")));
+  EXPECT_FALSE(fs::exists(bad.out));
+}
+
+TEST_F(CalibrateTilt, AMistypedReadingIsNamedWithItsPictureAndSize) {
+  for (const double by_deg : {0.4, 1.0}) {
+    const Outcome one =
+        Ran(RunCalibrateTilt,
+            With(Retyped(Csv(), [&](std::size_t row) { return row == 4 ? by_deg : 0.0; })));
+    EXPECT_EQ(one.code, ExitCode::kBadInput);
+    EXPECT_THAT(one.err,
+                AllOf(HasSubstr("/t03.pgm: the reading is "),
+                      HasSubstr("from where all other pictures put it"),
+                      HasSubstr("no calibration: see that each reading belongs to its picture")));
+    EXPECT_THAT(one.err, Not(HasSubstr("t04.pgm")));
+  }
+  const Outcome two =
+      Ran(RunCalibrateTilt,
+          With(Retyped(Csv(), [](std::size_t row) { return row == 3 || row == 8 ? 0.7 : 0.0; })));
+  EXPECT_EQ(two.code, ExitCode::kBadInput);
+  EXPECT_THAT(
+      two.err,
+      AllOf(HasSubstr("/t02.pgm: the reading is "), HasSubstr("/t07.pgm: the reading is ")));
+  // Two exchanged are tens of degrees off, and drag all others along.
+  auto rows = test::Rows(Csv());
+  std::swap(rows[3][0], rows[8][0]);
+  std::string csv;
+  for (const auto& row : rows) csv += fmt::format("{},{},{}\n", row[0], row[1], row[2]);
+  const Outcome exchanged = Ran(RunCalibrateTilt, With(csv));
+  EXPECT_EQ(exchanged.code, ExitCode::kBadInput);
+  EXPECT_THAT(exchanged.err,
+              AllOf(HasSubstr("see that each reading belongs to its picture"),
+                    HasSubstr("times as much as --sigma-deg"),
+                    Not(HasSubstr(".pgm"))));
+  EXPECT_FALSE(fs::exists(folder_ / "tilt.yaml"));
+}
+
+TEST_F(CalibrateTilt, ItSaysWhatEachReadingIsOffAndTheRigFileHasTheTablesSigma) {
+  std::string csv;
+  for (const auto& row : test::Rows(Csv())) {
+    const char* sigma = row[0] == "image" ? "sigma_deg" : row[0] == "t05.pgm" ? "0.012" : "0.008";
+    csv += fmt::format("{},{},{},{}\n", row[0], row[1], row[2], sigma);
+  }
+  const auto request = With(csv);
+  const Outcome outcome = Ran(RunCalibrateTilt, request);
+  ASSERT_EQ(outcome.code, ExitCode::kDone) << outcome.err;
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("of one reading 0.012"), HasSubstr("  t05.pgm\n")));
+  EXPECT_NEAR(RadToDeg(RigWith(ReadText(request.out))->rig.camera_tilt.sigma_rad), 0.012, 1e-9);
+  // The camera that it belongs to, to the last figure.
+  const auto part = LoadTiltPart(request.out);
+  ASSERT_TRUE(part.has_value()) << part.error()[0].Text();
+  EXPECT_EQ(part->camera_key, "calibrated.camera");
+  EXPECT_EQ(IntrinsicsOf(part->camera), IntrinsicsOf(BoardCamera()));
+  EXPECT_EQ(part->camera.image_width_px, 640);
 }
 
 TEST_F(CalibrateTilt, TheMissingMotionIsNamed) {

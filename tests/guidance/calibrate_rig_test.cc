@@ -1,5 +1,7 @@
 #include <cmath>
 #include <filesystem>
+#include <functional>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -52,7 +54,7 @@ TEST(CalibrationBytes, CutFlippedAndGluedTablesAndPartsAreRefusedOrReadAsTheySta
       "*110001+00000000000000P1 81..46+0000000045128358 82..46+0000000120808102 "
       "83..46+0000000004089988 \r\n";
   std::string part = RigYaml(test::FieldRig());
-  part += "calibrated: {covariance: [1, 2], camera_px: [1, 2, 3, 4]}\n";
+  part += "calibrated: {covariance: [1, 2], camera: {image_width: 640, camera_matrix: {}}}\n";
   const auto faults_are_said = [](const auto& result) {
     if (result) return;
     EXPECT_FALSE(result.error().empty());
@@ -107,12 +109,19 @@ class CalibrateRig : public ::testing::Test {
   void Reset() const {
     WriteText(folder_ / "camera.yaml", CameraSectionYaml(rig_) + Covariance());
     WriteText(folder_ / "tilt.yaml",
-              "inclinometers:\n  camera:\n" + TiltMountYaml(rig_.camera_tilt) +
-                  "calibrated:\n  camera_px: [3021.3, 3018.9, 644.7, 506.2]\n");
+              "inclinometers:\n  camera:\n" + TiltMountYaml(rig_.camera_tilt) + "calibrated:\n" +
+                  FoundWith());
     WriteText(
         folder_ / "target.yaml",
         TargetYaml(rig_.leds) + "inclinometers:\n  target:\n" + TiltMountYaml(rig_.target_tilt));
     WriteText(folder_ / "points.yaml", "rig_name: north_2\n" + PointsYaml(rig_.points));
+  }
+  // The camera's section once more, as a part of another.
+  std::string FoundWith() const {
+    std::string text;
+    std::istringstream lines(CameraSectionYaml(rig_));
+    for (std::string line; std::getline(lines, line);) text += "  " + line + "\n";
+    return text;
   }
   std::string Covariance(double fx_px2 = 0.45 * 0.45) const {
     const std::vector<double> variances = {
@@ -251,12 +260,14 @@ TEST_F(CalibrateRig, EachFaultOfAPartNamesFileLineAndKey) {
        "inclinometer",
        {"tilt.yaml:1: inclinometers: missing", "tbm calibrate tilt"}},
       {"tilt.yaml",
-       "3021.3",
-       "3021.4",
-       {"tilt.yaml:8: calibrated.camera_px: was found with another camera",
-        "3021.400",
-        "3021.300",
-        "run tbm calibrate tilt with --camera"}},
+       "image_width: 1280",
+       "image_width: x",
+       {"tilt.yaml:9: calibrated.camera.image_width"}},
+      {"tilt.yaml", "camera_matrix", "matrix", {"calibrated.camera.camera_matrix: missing"}},
+      {"tilt.yaml",
+       "calibrated",
+       "with",
+       {"tilt.yaml:1: calibrated.camera: missing", "belongs to the camera it was found with"}},
       {"target.yaml",
        "inclinometers",
        "inclinometer",
@@ -292,6 +303,52 @@ TEST_F(CalibrateRig, EachFaultOfAPartNamesFileLineAndKey) {
   EXPECT_THAT(
       Refused(request).err,
       AllOf(HasSubstr("no.yaml: cannot be read"), HasSubstr("inclinometers.camera: missing")));
+}
+
+TEST_F(CalibrateRig, ARotationThatWasFoundWithAnotherCameraIsRefused) {
+  const CameraModel good = rig_.camera;
+  const auto refused = [&](const std::string& tilt, const std::string& name) {
+    auto request = Request();
+    request.tilt = tilt;
+    EXPECT_THAT(Refused(request).err,
+                AllOf(HasSubstr("the rotation was found with another camera: " + name + " is "),
+                      HasSubstr("run tbm calibrate tilt with --camera " + request.camera)));
+  };
+  struct Case {
+    const char* name;
+    std::function<void(CameraModel*)> move;
+  };
+  const std::vector<Case> cases = {
+      {"image_width", [](CameraModel* c) { c->image_width_px += 1; }},
+      {"image_height", [](CameraModel* c) { c->image_height_px -= 1; }},
+      {"fx", [](CameraModel* c) { c->fx_px += 0.1; }},
+      {"fy", [](CameraModel* c) { c->fy_px += 0.1; }},
+      {"cx", [](CameraModel* c) { c->cx_px -= 0.1; }},
+      {"cy", [](CameraModel* c) { c->cy_px -= 0.1; }},
+      {"k1", [](CameraModel* c) { c->k1 += 1e-4; }},
+      {"k2", [](CameraModel* c) { c->k2 += 1e-4; }},
+      {"p1", [](CameraModel* c) { c->p1 += 1e-5; }},
+      {"p2", [](CameraModel* c) { c->p2 += 1e-5; }},
+      {"k3", [](CameraModel* c) { c->k3 += 1e-4; }}};
+  // An old rig file as the tilt's part of a new rig: what its rotation was found with is its own
+  // camera.
+  auto request = Request();
+  request.out = folder_ / "old.yaml";
+  ASSERT_EQ(Ran(RunCalibrateRig, request).code, ExitCode::kDone);
+  for (const Case& one : cases) {
+    SCOPED_TRACE(one.name);
+    rig_.camera = good;
+    one.move(&rig_.camera);
+    WriteText(folder_ / "camera.yaml", CameraSectionYaml(rig_) + Covariance());
+    refused(folder_ / "tilt.yaml", one.name);
+    refused(folder_ / "old.yaml", one.name);
+  }
+  // Written down is what counts, whatever camera stands in the same file.
+  rig_.camera = good;
+  Reset();
+  rig_.camera.fx_px += 1.0;
+  WriteText(folder_ / "tilt.yaml", ReadText(folder_ / "tilt.yaml") + CameraSectionYaml(rig_));
+  EXPECT_EQ(Ran(RunCalibrateRig, Request()).code, ExitCode::kDone);
 }
 
 TEST_F(CalibrateRig, APlacementThatCannotBeIsRefused) {

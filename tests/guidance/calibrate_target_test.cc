@@ -85,6 +85,17 @@ class CalibrateTarget : public ::testing::Test {
     }
     WriteText(Placement(name), text);
   }
+  // The reading of a placement, off by so much in both angles.
+  void Retype(const std::string& name, double by_deg) const {
+    std::string text;
+    for (const auto& row : Rows(ReadText(Placement("tilt.csv")))) {
+      text += row[0] == name
+                  ? fmt::format(
+                        "{},{},{}\n", name, std::stod(row[1]) + by_deg, std::stod(row[2]) + by_deg)
+                  : fmt::format("{}\n", fmt::join(row, ","));
+    }
+    WriteText(Placement("tilt.csv"), text);
+  }
   Outcome Refused() const {
     const Outcome outcome = Ran(RunCalibrateTarget, Request());
     EXPECT_EQ(outcome.code, ExitCode::kBadInput);
@@ -127,6 +138,8 @@ TEST_F(CalibrateTarget, ItsFileIsTheTargetsPartOfARigFile) {
   ASSERT_EQ(rows.size(), 1u + 30u);
   EXPECT_EQ(rows[6][0], "s2.gsi");
   EXPECT_EQ(rows[6][1], "P1");
+  EXPECT_EQ(rows[0][7], "controlled");
+  EXPECT_EQ(rows[6][7], "3");
   const auto json = nlohmann::json::parse(ReadText(request.report + "/target.json"));
   EXPECT_EQ(json["degrees_of_freedom"], 90 - 15 - 36 + 6);
   EXPECT_EQ(json["leds"][4]["id"], "P5");
@@ -191,6 +204,13 @@ TEST_F(CalibrateTarget, ReadingsThatContradictThePointsAreRefused) {
   Replace(&tilts, "x", "s5");  // a name without its ending will do
   WriteText(Placement("tilt.csv"), tilts);
   EXPECT_THAT(Refused().err, AllOf(HasSubstr("tilt.csv: no R1"), HasSubstr("its placement")));
+  // Mistyped by half a degree.
+  Survey();
+  Retype("s4.gsi", 0.5);
+  EXPECT_THAT(Refused().err,
+              AllOf(HasSubstr("tilt.csv: the reading of s4.gsi is 0."),
+                    HasSubstr("from where the points and all other readings put it"),
+                    HasSubstr("tilt.csv: no R1")));
   // Counted the other way.
   Survey();
   std::string turned;
@@ -243,6 +263,22 @@ TEST_F(CalibrateTarget, WhatIsWrongWithThePointsIsSaidWithFileLedAndSize) {
          Move("s5.csv", "P4", {0.0, 0.0, 2.0});
        },
        {"s5.csv: P4 is ", "from where all other points put it", "--sigma-mm"}},
+      {"three points off by 2 mm",
+       [&] {
+         Move("s5.csv", "P4", {0.0, 0.0, 2.0});
+         Move("s3.csv", "P1", {2.0, 0.0, 0.0});
+         Move("s1.csv", "P5", {0.0, -2.0, 0.0});
+       },
+       {"s5.csv: P4 is ", "s3.csv: P1 is ", "s1.csv: P5 is "}},
+      {"a placement with two readings",
+       [&] { Spoil("tilt.csv", "s2.gsi", "s1,1,1\ns2.gsi"); },
+       {"tilt.csv:3: column placement: s1.csv has its reading in line 2 already"}},
+      {"a name that two files have",
+       [&] {
+         WriteText(Placement("s1.gsi"), ReadText(Placement("s2.gsi")));
+         Spoil("tilt.csv", "s1.csv", "s1");
+       },
+       {"tilt.csv:2: column placement: 's1' may be s1.csv or s1.gsi; write the ending"}},
       {"one point far away",
        [&] {
          Move("s1.csv", "P2", {0.0, 5000.0, 0.0});
@@ -323,6 +359,7 @@ TEST_F(CalibrateTarget, WhatIsWrongWithThePointsIsSaidWithFileLedAndSize) {
        {"drawing.csv: cannot be opened"}}};
   for (const Case& one : cases) {
     SCOPED_TRACE(one.what);
+    fs::remove_all(folder_ / "placements");
     fs::create_directory(folder_ / "placements");
     WriteText(folder_ / "drawing.csv", kDrawing);
     Survey();
@@ -338,8 +375,9 @@ TEST_F(CalibrateTarget, TwoPlacementsThatDisagreeAreBothNamedAndOneAloneIsWarned
   fs::create_directory(folder_ / "placements");
   Survey();
   Move("s1.csv", "P4", {0.0, 0.0, 4.0});
-  EXPECT_THAT(Refused().err,
-              AllOf(HasSubstr("s1.csv"), HasSubstr("s2.gsi"), HasSubstr("P4"), HasSubstr("third")));
+  EXPECT_THAT(
+      Refused().err,
+      AllOf(HasSubstr("s1.csv: P4"), HasSubstr("s2.gsi: P4"), HasSubstr("another placement")));
   fs::remove(Placement("s2.gsi"));
   fs::remove(Placement("tilt.csv"));
   const Outcome alone = Ran(RunCalibrateTarget, Request());
@@ -375,11 +413,44 @@ TEST_F(CalibrateTarget, PointsOfOtherThingsAndRepeatedOnesAreTakenAsTheyAre) {
   const std::string again = csv.substr(first, csv.find('\n', first) + 1 - first);
   WriteText(Placement("s1.csv"), csv + ",REF7,1,2,3\n" + again);
   auto request = Request();
-  request.sigma_mm = 0.02;
-  const Outcome outcome = Ran(RunCalibrateTarget, request);
+  request.sigma_mm = 0.045;
+  Outcome outcome = Ran(RunCalibrateTarget, request);
   EXPECT_EQ(outcome.code, ExitCode::kDone) << outcome.err;
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("passed over"), HasSubstr("'REF7'")));
-  EXPECT_THAT(outcome.err, HasSubstr("times as much as --sigma-mm 0.02"));
+  EXPECT_THAT(outcome.err, HasSubstr("times as much as --sigma-mm 0.045"));
+  // More than three times is no scatter.
+  request.sigma_mm = 0.02;
+  request.out = folder_ / "other.yaml";
+  outcome = Ran(RunCalibrateTarget, request);
+  EXPECT_EQ(outcome.code, ExitCode::kBadInput);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("--sigma-mm 0.02"), HasSubstr("the worst is s")));
+  EXPECT_FALSE(fs::exists(request.out));
+}
+
+TEST_F(CalibrateTarget, ARigFileSaysOfOneReadingWhatTheTableDoes) {
+  std::string text;
+  for (const auto& row : Rows(ReadText(Placement("tilt.csv")))) {
+    const char* sigma = row[0] == "placement" ? "sigma_deg" : row[0] == "s3.csv" ? "0.02" : "0.008";
+    text += fmt::format("{},{}\n", fmt::join(row, ","), sigma);
+  }
+  WriteText(Placement("tilt.csv"), text);
+  const Outcome outcome = Ran(RunCalibrateTarget, Request());
+  ASSERT_EQ(outcome.code, ExitCode::kDone) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("of one reading 0.02"));
+  EXPECT_NEAR(RadToDeg(LoadTargetPart(Request().out)->mount.sigma_rad), 0.02, 1e-9);
+}
+
+TEST_F(CalibrateTarget, ReadingsWorseThanTheirSigmaMakeThatOfTheMountingLarger) {
+  ASSERT_EQ(Ran(RunCalibrateTarget, Request()).code, ExitCode::kDone);
+  const double good_rad = LoadTargetPart(Request().out)->mount.mounting_sigma_rad;
+  survey_.tilt_sigma_deg = 0.02;
+  Survey();
+  auto request = Request();
+  request.force = true;
+  const Outcome outcome = Ran(RunCalibrateTarget, request);
+  ASSERT_EQ(outcome.code, ExitCode::kDone) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("the sigma of the mounting is that much larger"));
+  EXPECT_GT(LoadTargetPart(request.out)->mount.mounting_sigma_rad, 1.5 * good_rad);
 }
 
 TEST_F(CalibrateTarget, NothingIsReplacedUnlessForced) {

@@ -214,6 +214,101 @@ TEST(TiltRotation, WhatCannotBeKnownIsRefusedAndTheMotionNamed) {
   EXPECT_GT(too_weak.error().sigma_rad, 0.0035);
 }
 
+// Declared are sigmas that are too small by `times`.
+Bench Overrated(unsigned seed, double times) {
+  Bench bench(seed);
+  bench.Draw();
+  for (TiltPlacement& one : bench.placements) {
+    one.camera_sigma_rad /= times;
+    one.tilt_sigma_rad /= times;
+  }
+  return bench;
+}
+
+TEST(TiltRotation, ReadingsThatAreWorseThanDeclaredMakeItsSigmaLarger) {
+  double nees = 0.0;
+  int taken = 0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    const Bench bench = Overrated(seed + 100, 2.2);
+    const auto found = FindTiltRotation(bench.placements, {});
+    if (!found) continue;
+    ++taken;
+    EXPECT_GT(found->sigma_factor, 1.4);
+    EXPECT_LE(found->sigma_factor, 3.0);
+    const Eigen::AngleAxisd off(
+        Eigen::Matrix3d(bench.camera_from_housing * found->camera_from_housing.transpose()));
+    const Eigen::Vector3d e = off.angle() * off.axis();
+    nees += e.dot(found->covariance.inverse() * e);
+  }
+  EXPECT_GE(taken, 55);
+  EXPECT_NEAR(nees / taken, 3.0, 1.2) << "sigma has an error of its own, of 19 degrees of freedom";
+  const auto refused = FindTiltRotation(Overrated(7, 5.0).placements, {});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().fault, TiltRotationFault::kNoRotation);
+  EXPECT_NEAR(refused.error().sigma_factor, 5.0, 1.5);
+  ASSERT_EQ(refused.error().wrong.size(), 1u) << "the worst, to look at";
+}
+
+TEST(TiltRotation, AMistypedReadingIsNamed) {
+  for (const double off_deg : {0.4, 1.0, 10.0}) {
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      SCOPED_TRACE(testing::Message() << off_deg << " degrees, seed " << seed);
+      Bench bench(seed + 200);
+      bench.Draw();
+      const std::size_t wrong = seed % 12;
+      Eigen::Vector3d& up = bench.placements[wrong].up_in_housing;
+      up = (Eigen::AngleAxisd(DegToRad(off_deg), Eigen::Vector3d::UnitY()) * up).eval();
+      for (const bool up_is_given : {false, true}) {
+        TiltRotationOptions options;
+        if (up_is_given) options.up_in_board = bench.up_in_board;
+        const auto found = FindTiltRotation(bench.placements, options);
+        ASSERT_FALSE(found);
+        EXPECT_EQ(found.error().fault, TiltRotationFault::kDoesNotFit);
+        ASSERT_EQ(found.error().wrong.size(), 1u);
+        EXPECT_EQ(found.error().wrong[0].placement, wrong);
+        EXPECT_TRUE(found.error().wrong[0].or_rather.empty());
+        EXPECT_NEAR(
+            found.error().wrong[0].off_rad, DegToRad(off_deg), DegToRad(0.1 + 0.03 * off_deg));
+        options.takes_misfits = true;
+        const auto rough = FindTiltRotation(bench.placements, options);
+        ASSERT_TRUE(rough);
+        EXPECT_EQ(rough->sigma_factor, 1.0);
+      }
+    }
+  }
+}
+
+TEST(TiltRotation, SeveralWrongReadingsDoNotHideOneAnother) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    Bench bench(seed + 300);
+    bench.Draw();
+    for (const std::size_t wrong : {1u, 5u, 9u}) {
+      Eigen::Vector3d& up = bench.placements[wrong].up_in_housing;
+      up = (Eigen::AngleAxisd(DegToRad(0.5), Eigen::Vector3d::UnitX()) * up).eval();
+    }
+    const auto found = FindTiltRotation(bench.placements, {});
+    ASSERT_FALSE(found);
+    EXPECT_EQ(found.error().fault, TiltRotationFault::kDoesNotFit);
+    std::vector<std::size_t> named;
+    for (const WrongTilt& one : found.error().wrong) named.push_back(one.placement);
+    EXPECT_THAT(named, ::testing::UnorderedElementsAre(1u, 5u, 9u));
+  }
+}
+
+TEST(TiltRotation, AnUpThatIsWronglyGivenIsNoticed) {
+  Bench bench(11);
+  bench.Draw();
+  TiltRotationOptions options;
+  options.up_in_board =
+      Eigen::AngleAxisd(DegToRad(1.0), bench.up_in_board.unitOrthogonal()) * bench.up_in_board;
+  options.up_sigma_rad = DegToRad(0.02);
+  const auto found = FindTiltRotation(bench.placements, options);
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().fault, TiltRotationFault::kNoRotation);
+  EXPECT_GT(found.error().sigma_factor, 3.0);
+}
+
 TEST(TiltRotation, ABoardThatMovedIsNoticed) {
   Bench bench(5);
   bench.Draw();
