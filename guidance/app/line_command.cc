@@ -5,12 +5,14 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "guidance/app/rail_run_for.h"
+#include "guidance/app/rail_run.h"
 #include "guidance/app/rail_start_words.h"
+#include "guidance/app/table_and_report.h"
 #include "guidance/rail/inertial_line.h"
 #include "guidance/rail/rail_line.h"
 
@@ -172,21 +174,38 @@ Result<RailLine, RailStartFailure> Solve(const LineRequest& request, const RailR
 
 }  // namespace
 
-ExitCode RunLine(const LineRequest& request, const Console& console) {
+Result<std::string, std::vector<std::string>> WriteLine(
+    const LineRequest& request, const std::function<void(const std::string&)>& warn) {
+  const auto why = [](std::string fault) {
+    return Failure{std::vector<std::string>{std::move(fault)}};
+  };
   const TableAndReport files(request.out, request.force);
-  const auto run = RailRunFor(request.run, files, console);
-  if (!run) return ExitCode::kBadInput;
-  for (const std::string& advice : run->advice) Complain(console, "warning: " + advice);
+  if (const auto obstacle = files.Obstacle()) return why(*obstacle);
+  const auto run = ReadRailRun(request.run);
+  if (!run) {
+    std::vector<std::string> faults;
+    for (const FileFault& fault : run.error()) faults.push_back(fault.Text());
+    return Failure{std::move(faults)};
+  }
+  for (const std::string& warning : run->warnings) warn(warning);
+  for (const std::string& advice : run->advice) warn(advice);
   const auto line = Solve(request, *run);
-  if (!line) {
-    Complain(console, request.run + "/" + Explain(line.error(), run->setup));
+  if (!line) return why(request.run + "/" + Explain(line.error(), run->setup));
+  // A target's name may be no UTF-8.
+  const std::string report =
+      Report(request, *run, *line).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  if (const auto fault = files.Write(Table(*line), report)) return why(*fault);
+  return files.has_report() ? Summary(*line, *run) : "";
+}
+
+ExitCode RunLine(const LineRequest& request, const Console& console) {
+  const auto summary = WriteLine(
+      request, [&](const std::string& warning) { Complain(console, "warning: " + warning); });
+  if (!summary) {
+    for (const std::string& fault : summary.error()) Complain(console, fault);
     return ExitCode::kBadInput;
   }
-  if (const auto fault = files.Write(Table(*line), Report(request, *run, *line).dump(2) + "\n")) {
-    Complain(console, *fault);
-    return ExitCode::kBadInput;
-  }
-  if (files.has_report()) console.out << Summary(*line, *run);
+  console.out << *summary;
   return ExitCode::kDone;
 }
 

@@ -42,6 +42,29 @@ const std::array<AlarmRule, kRailAlarmCount>& Rules() {
        .priority = AlarmPriority::kLow,
        .cause = "the trolley's calibration is older than calibration.due_after_days",
        .response = "calibrate the trolley and write the day down"},
+      {.code = "clock_set",
+       .priority = AlarmPriority::kMedium,
+       .cause = "the computer's clock was set during the run",
+       .response = "the run keeps its time; where a camera box finds targets, begin a new run"},
+      {.code = "datum_shift",
+       .priority = AlarmPriority::kMedium,
+       .cause = "the whole line is higher or lower than the base: rather its targets than the rail",
+       .response = "survey targets and start point again; then as the monitoring plan says"},
+      {.code = "targets_silent",
+       .priority = AlarmPriority::kMedium,
+       .cause = "the camera box says nothing: the place drifts",
+       .response = "power and cable of the box; is its machine_id the trolley's?",
+       .raise_after = std::chrono::seconds(5)},
+      {.code = "inclinometer_silent",
+       .priority = AlarmPriority::kMedium,
+       .cause = "the trolley's inclinometer says nothing",
+       .response = "its cable, supply and address",
+       .raise_after = std::chrono::seconds(5)},
+      {.code = "measurements_lost",
+       .priority = AlarmPriority::kMedium,
+       .cause =
+           "measurements are missing in the record: too late, twice, or more than it could take",
+       .response = "clocks of the instruments, load of the computer; measure again"},
   }};
   return rules;
 }
@@ -84,6 +107,7 @@ RailAlarms::News RailAlarms::Take(bool all, Timestamp now) {
     if (alarm.state == AlarmState::kUnacknowledged) acknowledged_by_[i] = {};
     const std::string cause =
         what_[i].empty() ? std::string(rule.cause) : fmt::format("{}: {}", rule.cause, what_[i]);
+    const bool fits = cause.size() <= decltype(dds::AlarmStatus::cause)::capacity();
     dds::AlarmStatus status;
     status.machine_id = machine_id_;
     status.source = kRailLineSource;
@@ -100,7 +124,8 @@ RailAlarms::News RailAlarms::Take(bool all, Timestamp now) {
     status.value = alarm.value.value_or(dds::kNaN);
     status.raise_above = rule.raise_above;
     status.clear_below = rule.clear_below;
-    status.cause = std::string_view(cause);
+    // The code says the rest.
+    status.cause = std::string_view(fits ? cause : what_[i]);
     status.response = rule.response;
     status.acknowledged_by = acknowledged_by_[i];
     if (alarm.shelved_until) {

@@ -20,8 +20,13 @@ enum class RailAlarm {
   kLineNotWritten,
   kSettlementFound,
   kCalibrationDue,
+  kClockSet,
+  kDatumShift,
+  kTargetsSilent,
+  kInclinometerSilent,
+  kMeasurementsLost,
 };
-inline constexpr std::size_t kRailAlarmCount = 7;
+inline constexpr std::size_t kRailAlarmCount = 12;
 
 // The alarms of the process rail_line, and what people ask of them. One thread.
 class RailAlarms {

@@ -11,6 +11,8 @@ namespace {
 
 // How long a thread may take to notice that it is to end.
 constexpr std::chrono::milliseconds kPatience{100};
+// A camera box speaks with each frame, targets or not.
+constexpr std::chrono::seconds kFramesSilent{2};
 // Half a minute of the fastest unit: beyond it the process hangs.
 constexpr std::size_t kMostInputs = 60'000;
 
@@ -62,7 +64,7 @@ RailDevices::RailDevices(const RailLineConfig& config,
   if (devices.has_target_pixels) {
     features_.emplace(participant,
                       [this](const dds::FrameFeatures& features, const dds::SampleFacts& facts) {
-                        if (!facts.contested) Hear(features);
+                        Hear(features, facts);
                       });
   }
 }
@@ -72,7 +74,13 @@ RailDevices::~RailDevices() { features_.reset(); }
 void RailDevices::ReadUnit(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     const auto sample = unit_->Read(clock_.Steady() + kPatience);
-    if (!sample || !sample->specific_force_m_s2) continue;
+    if (!sample) continue;
+    {
+      const std::lock_guard lock(mutex_);
+      lacks_force_ = !sample->specific_force_m_s2;
+      if (lacks_force_) ++without_force_;
+    }
+    if (!sample->specific_force_m_s2) continue;
     Add(ImuSample{.ends_at = sample->ends_at,
                   .interval_s = sample->interval_s,
                   .gyro_rad_s = sample->rate_rad_s,
@@ -89,15 +97,20 @@ void RailDevices::ReadInclinometer(const std::stop_token& stop) {
 }
 
 // A spot of a target is named by its row in targets.csv.
-void RailDevices::Hear(const dds::FrameFeatures& features) {
+void RailDevices::Hear(const dds::FrameFeatures& features, const dds::SampleFacts& facts) {
   if (features.machine_id.view() != config_.machine_id) return;
+  {
+    const std::lock_guard lock(mutex_);
+    is_contested_ = facts.contested;
+    ++(facts.contested ? contested_ : frames_);
+    frame_at_ = clock_.Steady();
+  }
+  if (facts.contested) return;
   TargetImage image{features.sensed_at, {}};
   for (const dds::Spot& spot : features.spots) {
     if (spot.led_index < 0 || static_cast<std::size_t>(spot.led_index) >= targets_) continue;
-    TargetPixel pixel;
-    pixel.target = spot.led_index;
-    pixel.pixel_px = spot.centre.pixel_px;
-    image.pixels.push_back(pixel);
+    const double sigma_px = spot.centre.sigma_px > 0.0 ? spot.centre.sigma_px : 0.0;  // or NaN
+    image.pixels.push_back({spot.led_index, spot.centre.pixel_px, sigma_px});
   }
   if (!image.pixels.empty()) Add(std::move(image));
 }
@@ -118,26 +131,65 @@ void RailDevices::Take(std::chrono::steady_clock::time_point, std::vector<RailIn
 }
 
 bool RailDevices::FillHealth(std::string_view device, dds::DeviceHealth* health) const {
-  if (device == "imu") {
-    const InertialHealth of = unit_->Health();
-    health->state = StateOf(of.state);
-    health->samples_good = of.counters.good;
-    health->samples_lost = of.counters.lost;
-    health->errors = of.counters.garbled + of.counters.faulty + of.counters.overloads;
-    health->reconnects = of.counters.reconnects;
-    if (of.last_failure) health->detail = FailureCode(*of.last_failure);
-    return true;
+  if (device == "rail_line") {
+    const std::lock_guard lock(mutex_);
+    health->samples_lost += dropped_;
+  } else if (device == "imu") {
+    FillUnitHealth(health);
+  } else if (device == "inclinometer" && inclinometer_ != nullptr) {
+    FillInclinometerHealth(health);
+  } else if (device == "targets") {
+    FillTargetsHealth(health);
+  } else {
+    return false;
   }
-  if (device == "inclinometer" && inclinometer_ != nullptr) {
-    const InclinometerHealth of = inclinometer_->Health();
-    health->state = StateOf(of.state);
-    health->samples_good = of.counters.good;
-    health->errors = of.counters.garbled + of.counters.implausible + of.counters.no_reply;
-    health->reconnects = of.counters.reconnects;
-    if (of.last_failure) health->detail = FailureCode(*of.last_failure);
-    return true;
+  return true;
+}
+
+void RailDevices::FillUnitHealth(dds::DeviceHealth* health) const {
+  const std::lock_guard lock(mutex_);
+  const InertialHealth of = unit_->Health();
+  health->state = StateOf(of.state);
+  health->samples_good = of.counters.good - without_force_;
+  health->samples_lost = of.counters.lost;
+  health->errors =
+      of.counters.garbled + of.counters.faulty + of.counters.overloads + without_force_;
+  health->reconnects = of.counters.reconnects;
+  if (of.last_failure) {
+    health->detail = FailureCode(*of.last_failure);
+  } else if (lacks_force_) {
+    health->state = dds::DeviceState::kFault;
+    health->detail =
+        "no specific force in its samples: set it to send accelerations; gyros alone carry no line";
   }
-  return false;
+}
+
+void RailDevices::FillInclinometerHealth(dds::DeviceHealth* health) const {
+  const InclinometerHealth of = inclinometer_->Health();
+  health->state = StateOf(of.state);
+  health->samples_good = of.counters.good;
+  health->errors = of.counters.garbled + of.counters.implausible + of.counters.no_reply;
+  health->reconnects = of.counters.reconnects;
+  if (of.last_failure) health->detail = FailureCode(*of.last_failure);
+}
+
+void RailDevices::FillTargetsHealth(dds::DeviceHealth* health) const {
+  const std::lock_guard lock(mutex_);
+  health->samples_good = frames_;
+  health->errors = contested_;
+  if (!features_) {
+    health->state = dds::DeviceState::kClosed;
+  } else if (!frame_at_) {
+    health->state = dds::DeviceState::kOpening;
+    health->detail = "no camera box has spoken for this machine";
+  } else if (clock_.Steady() - *frame_at_ > kFramesSilent) {
+    health->state = dds::DeviceState::kSilent;
+  } else if (is_contested_) {
+    health->state = dds::DeviceState::kFault;
+    health->detail = "two camera boxes speak for this machine: neither is used";
+  } else {
+    health->state = dds::DeviceState::kStreaming;
+  }
 }
 
 }  // namespace tbm

@@ -11,6 +11,8 @@
 #include "devices/replay/csv.h"
 #include "guidance/app/exit_code.h"
 #include "guidance/app/rail_line_process.h"
+#include "guidance/app/rail_outcome.h"
+#include "guidance/app/run_folders.h"
 #include "guidance/config/rail_line_file.h"
 #include "idl/cpp/dds_process.h"
 #include "pose/base/clock.h"
@@ -41,6 +43,14 @@ bool AreFolders(const RailLineConfig& config, const std::string& config_file) {
   return are;
 }
 
+// Half a day of time zones, for a calibration of today.
+constexpr Duration kOfToday = std::chrono::hours(14);
+
+std::optional<std::string> CalibrationFault(const RailLineConfig& config, Timestamp now) {
+  if (!config.calibrated_at || *config.calibrated_at <= now + kOfToday) return {};
+  return "calibration.date: lies in the future; it, or this computer's clock, is wrong";
+}
+
 int Main(const std::string& config_file, bool check_only) {
   const auto config = LoadRailLineConfig(config_file);
   if (!config) {
@@ -48,6 +58,15 @@ int Main(const std::string& config_file, bool check_only) {
     return BadInput();
   }
   if (!AreFolders(*config, config_file)) return BadInput();
+  const SystemClock clock;
+  if (const auto fault = CalibrationFault(*config, clock.Now())) {
+    fmt::print(stderr, "{}: {}\n", config_file, *fault);
+    return BadInput();
+  }
+  if (const auto fault = BaseFault(*config)) {
+    fmt::print(stderr, "{}: settlement.base: {}\n", config_file, *fault);
+    return BadInput();
+  }
   const std::string folder =
       config->replay ? config->replay->run_folder : config->devices->setup_folder;
   const auto run = config->replay ? ReadRailRun(folder) : ReadRailSetup(folder);
@@ -87,14 +106,18 @@ int Main(const std::string& config_file, bool check_only) {
     return static_cast<int>(ExitCode::kDone);
   }
 
+  RunFolders folders(config->runs_folder, config->lines_folder);
+  if (const auto fault = folders.Take()) {
+    fmt::print(stderr, "{}: {}\n", config_file, *fault);
+    return BadInput();
+  }
   HoldSignals();
   signal(SIGPIPE, SIG_IGN);
-  const SystemClock clock;
   dds::AlarmRelay alarms;
   dds::Participant participant(participant_config, alarms.Handler(), dds::LogDds);
   const RailLineProcess::Texts texts{TextOf(folder + "/rail.yaml"),
                                      TextOf(folder + "/targets.csv")};
-  RailLineProcess process(*config, *run, texts, participant, clock);
+  RailLineProcess process(*config, *run, texts, folders, participant, clock);
   alarms.SendTo([&process](const dds::Alarm& alarm) { process.Report(alarm); });
   fmt::print(stderr,
              "source=rail_line code=started version={} machine_id={} domain={}\n",

@@ -2,30 +2,28 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <future>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
-#include <sstream>
 #include <thread>
 #include <utility>
 #include <vector>
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include "guidance/app/line_command.h"
-#include "guidance/app/line_file.h"
+#include "guidance/app/even_clock.h"
 #include "guidance/app/rail_alarms.h"
 #include "guidance/app/rail_devices.h"
+#include "guidance/app/rail_outcome.h"
 #include "guidance/app/rail_recorder.h"
 #include "guidance/app/rail_replay.h"
+#include "guidance/app/rail_start_words.h"
 #include "guidance/app/rail_words.h"
 #include "guidance/config/sha256.h"
 #include "guidance/core/alarm_command.h"
 #include "guidance/rail/rail_tracker.h"
-#include "guidance/rail/settlement.h"
 #include "idl/cpp/dds_process.h"
 #include "idl/cpp/publisher.h"
 #include "idl/cpp/subscriber.h"
@@ -33,135 +31,24 @@
 namespace tbm {
 namespace {
 
-namespace fs = std::filesystem;
 using std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kTick{10};
 constexpr std::chrono::milliseconds kStatePeriod{100};
 constexpr std::chrono::seconds kHealthPeriod{1};
+// Who was asked to end by a signal goes on for so long at the most, until all have the line.
+constexpr std::chrono::seconds kFarewell{1};
+// Clocks that are brought together slowly go together with the steady one; what is more was set.
+constexpr Duration kClockSet = std::chrono::milliseconds(20);
+constexpr std::size_t kMostWarningsTold = 5;
 constexpr std::size_t kMostReports = 256;
 constexpr std::size_t kMostCommands = 64;
 constexpr std::size_t kMostAnswered = 64;
-
-// "rail_20261123_114500", by its beginning; another number behind it where there is one already.
-std::string RunIdAt(Timestamp now, const RailLineConfig& config) {
-  const auto seconds = static_cast<std::time_t>(now.ns / 1'000'000'000);
-  const std::string id = fmt::format("rail_{:%Y%m%d_%H%M%S}", fmt::gmtime(seconds));
-  const auto is_taken = [&](const std::string& name) {
-    std::error_code ignored;
-    for (const std::string& folder : {config.runs_folder, config.lines_folder}) {
-      const std::string path = folder + "/" + name;
-      if (fs::exists(path, ignored) || fs::exists(path + std::string(kUnfinished), ignored)) {
-        return true;
-      }
-    }
-    return false;
-  };
-  std::string name = id;
-  for (int number = 2; is_taken(name); ++number) name = fmt::format("{}_{}", id, number);
-  return name;
-}
-
-std::vector<std::string> UnfinishedIn(const std::string& folder) {
-  std::vector<std::string> found;
-  std::error_code error;
-  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-    const std::string name = it->path().filename().string();
-    if (name.starts_with("rail_") && name.ends_with(kUnfinished)) found.push_back(it->path());
-  }
-  std::sort(found.begin(), found.end());
-  return found;
-}
 
 std::vector<std::string> NamesOf(const std::vector<SurveyedTarget>& targets) {
   std::vector<std::string> names;
   for (const SurveyedTarget& target : targets) names.push_back(target.name);
   return names;
-}
-
-// What became of a run: a line, or why there is none; and what it was compared with.
-struct Outcome {
-  std::optional<FinishedLine> line;
-  std::string trouble;  // why there is no line
-  std::string remarks;  // of the one who made it
-  std::vector<dds::SettlementPiece> settlement;
-  std::string no_settlement;  // why there is none, where a base is given
-};
-
-// line.csv and its digest.
-Result<FinishedLine, std::string> ReadFinished(const std::string& path, std::string run_id) {
-  auto text = ReadTextFile(path);
-  if (!text) return Failure{text.error().Text()};
-  auto line = ReadLineFile(path);
-  if (!line) return Failure{line.error().front().Text()};
-  return FinishedLine{std::move(run_id), Sha256(*text), std::move(line->points)};
-}
-
-// The base's run is named by its folder.
-std::string RunOfLine(const std::string& path) {
-  std::error_code ignored;
-  const fs::path whole = fs::absolute(path, ignored);
-  std::string name = whole.parent_path().filename().string();
-  return name.empty() ? "base" : name;
-}
-
-void Compare(const RailLineConfig& config, Outcome* outcome) {
-  if (config.base_line.empty()) return;
-  const auto base = ReadFinished(config.base_line, RunOfLine(config.base_line));
-  if (!base) {
-    outcome->no_settlement = base.error();
-    return;
-  }
-  SettlementOptions options;
-  options.step_m = config.settlement_step_m;
-  options.level = config.settlement_level;
-  options.alert_m = config.alert_m;
-  const std::vector<RailPoint> epochs[] = {base->points, outcome->line->points};
-  const auto settlement = CompareEpochs(epochs, options);
-  if (!settlement) {
-    outcome->no_settlement =
-        fmt::format("{} and this line cannot be compared; tbm settle says why", config.base_line);
-    return;
-  }
-  outcome->settlement = PiecesOf(*settlement, *base, *outcome->line, config.settlement_level);
-}
-
-// Both files of the line at once, by the way of `tbm line`.
-Outcome MakeLine(const RailLineConfig& config, const std::string& run, const std::string& run_id) {
-  Outcome outcome;
-  const std::string folder = config.lines_folder + "/" + run_id;
-  const std::string unborn = folder + std::string(kUnfinished);
-  std::error_code error;
-  fs::create_directories(unborn, error);
-  if (error) {
-    outcome.trouble = fmt::format("{}: {}", unborn, error.message());
-    return outcome;
-  }
-  std::ostringstream said;
-  std::ostringstream complaints;
-  const Console console{said, complaints};
-  const ExitCode code = RunLine({.run = run, .out = unborn + "/line.csv"}, console);
-  outcome.remarks = complaints.str();
-  if (code != ExitCode::kDone) {
-    outcome.trouble = complaints.str();
-    fs::remove_all(unborn, error);
-    return outcome;
-  }
-  SyncFolder(unborn);
-  fs::rename(unborn, folder, error);
-  if (error) {
-    outcome.trouble = fmt::format("{}: {}", folder, error.message());
-    return outcome;
-  }
-  SyncFolder(config.lines_folder);
-  auto line = ReadFinished(folder + "/line.csv", run_id);
-  if (!line) {
-    outcome.trouble = line.error();
-    return outcome;
-  }
-  outcome.line = std::move(line).value();
-  Compare(config, &outcome);
-  return outcome;
 }
 
 std::unique_ptr<RailSource> SourceOf(const RailLineConfig& config,
@@ -172,8 +59,6 @@ std::unique_ptr<RailSource> SourceOf(const RailLineConfig& config,
   return std::make_unique<RailDevices>(config, run.recording.targets.size(), participant, clock);
 }
 
-std::string FirstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
-
 }  // namespace
 
 class RailLineProcess::Impl {
@@ -181,17 +66,19 @@ class RailLineProcess::Impl {
   Impl(const RailLineConfig& config,
        const RailRun& run,
        const Texts& texts,
+       RunFolders& folders,
        dds::Participant& participant,
        const Clock& clock)
       : config_(config),
         setup_(run.setup),
+        folders_(folders),
         clock_(clock),
-        started_at_(clock.Now()),
-        run_id_(RunIdAt(started_at_, config)),
+        even_clock_(clock),
+        run_id_(folders.FreeName(clock.Now())),
         rail_yaml_sha256_(Sha256(texts.rail_yaml)),
-        source_(SourceOf(config, run, participant, clock)),
+        source_(SourceOf(config, run, participant, even_clock_)),
         tracker_(run.setup, run.recording.targets, {.lag_s = config.lag_s}),
-        recorder_(config.runs_folder + "/" + run_id_,
+        recorder_(folders.RunPath(run_id_),
                   {texts.rail_yaml, texts.targets_csv, NamesOf(run.recording.targets)},
                   HoldBack(config)),
         alarms_(config.machine_id),
@@ -210,13 +97,17 @@ class RailLineProcess::Impl {
   }
 
   ExitCode Run(const std::stop_token& stop, const std::function<void()>& on_alive) {
-    CleanUp();
+    for (const std::string& path : folders_.CleanUp()) {
+      TellOnce("unfinished_run",
+               dds::Severity::kWarning,
+               path + " was left by a process that died; tbm line may still make its line");
+    }
     if (const auto failed = recorder_.Begin()) {
       Watch(RailAlarm::kRunNotWritten, true, *failed);
       Beat(clock_.Now());
       return ExitCode::kBadInput;
     }
-    Tell("run_begun", dds::Severity::kInfo, false, fmt::format("run {}", run_id_));
+    TellOnce("run_begun", dds::Severity::kInfo, fmt::format("run {}", run_id_));
     heard_at_ = clock_.Steady();
     while (!stop.stop_requested() && !is_asked_to_end_ && !source_->has_ended()) {
       TakeInputs();
@@ -227,7 +118,8 @@ class RailLineProcess::Impl {
     has_ended_ = true;
     TellState(clock_.Now());
     const ExitCode code = Finish(on_alive);
-    Hold(on_alive);
+    folders_.Release();
+    Hold(stop, on_alive);
     return code;
   }
 
@@ -244,21 +136,6 @@ class RailLineProcess::Impl {
     return Duration(std::llround((config.lag_s + 5.0) * 1e9));
   }
 
-  // After a power cut: a line that was being made is nobody's; what was measured is told.
-  void CleanUp() {
-    std::error_code ignored;
-    for (const std::string& path : UnfinishedIn(config_.lines_folder)) {
-      fs::remove_all(path, ignored);
-    }
-    for (const std::string& path : UnfinishedIn(config_.runs_folder)) {
-      Tell("unfinished_run",
-           dds::Severity::kWarning,
-           false,
-           fmt::format("{} was left by a process that died; tbm line may still make its line",
-                       path));
-    }
-  }
-
   void TakeInputs() {
     source_->Take(clock_.Steady(), &inputs_);
     for (const RailInput& input : inputs_) {
@@ -267,9 +144,13 @@ class RailLineProcess::Impl {
     }
   }
 
+  // The unit lives while its time goes on: the tracker takes no sample that is not newer.
   void Count(const ImuSample& sample) {
     ++samples_;
-    heard_at_ = clock_.Steady();
+    if (sample.ends_at > newest_sample_) {
+      newest_sample_ = sample.ends_at;
+      heard_at_ = clock_.Steady();
+    }
     tracker_.Add(sample);
   }
   void Count(const TrolleyTilt& tilt) {
@@ -302,7 +183,13 @@ class RailLineProcess::Impl {
 
   bool IsImuSilent() const {
     const std::chrono::duration<double> silent = clock_.Steady() - heard_at_;
-    return !has_ended_ && silent.count() > config_.imu_silent_after_s;
+    return !has_ended_ && std::max(silent.count(), BehindS()) > config_.imu_silent_after_s;
+  }
+
+  // How old the newest sample was when it came. One that is played is as old as its run.
+  double BehindS() const {
+    if (!config_.devices || samples_ == 0) return 0.0;
+    return SecondsBetween(newest_sample_, even_clock_.Now());
   }
 
   std::string_view WhyNone() const {
@@ -335,13 +222,16 @@ class RailLineProcess::Impl {
     state.gaps = tracker_.gaps();
     states_.Write(state);
     Watch(RailAlarm::kImuSilent, IsImuSilent());
-    Watch(RailAlarm::kStartFailed, tracker_.phase() == RailTrackerPhase::kStartFailed);
+    const auto& why_no_start = tracker_.start_failure();
+    Watch(RailAlarm::kStartFailed,
+          why_no_start.has_value(),
+          why_no_start ? Explain(*why_no_start, setup_) : "");
     Watch(RailAlarm::kComesTooLate, tracker_.came_too_late() > late_told_);
     late_told_ = tracker_.came_too_late();
   }
 
   void Watch(RailAlarm alarm, bool holds, const std::string& what = "") {
-    alarms_.Watch(alarm, holds ? 1.0 : 0.0, clock_.Now(), what);
+    alarms_.Watch(alarm, holds ? 1.0 : 0.0, clock_.Now(), holds ? what : "");
   }
 
   void Beat(Timestamp now) {
@@ -363,28 +253,64 @@ class RailLineProcess::Impl {
       calibrations_.Write(status);
     }
     Watch(RailAlarm::kCalibrationDue, is_due);
+    WatchClock();
     TellHealth(now);
     TellAlarms(true, now);
   }
 
+  // A run that is played has its own time.
+  void WatchClock() {
+    if (!config_.devices || has_ended_) return;
+    const Duration set = even_clock_.SetSince();
+    Watch(RailAlarm::kClockSet,
+          std::chrono::abs(set) > kClockSet,
+          fmt::format("by {:+.2f} s", std::chrono::duration<double>(set).count()));
+  }
+
   void TellHealth(Timestamp now) {
-    const bool is_silent = IsImuSilent();
-    const auto state = [&](std::uint64_t heard, bool silent) {
+    const auto state = [&](std::uint64_t heard, bool silent = false) {
       if (has_ended_) return dds::DeviceState::kClosed;
       if (heard == 0) return dds::DeviceState::kOpening;
       return silent ? dds::DeviceState::kSilent : dds::DeviceState::kStreaming;
     };
-    WriteHealth("rail_line", dds::DeviceState::kStreaming, states_.counters().written, 0, now);
-    WriteHealth("imu", state(samples_, is_silent), samples_, tracker_.gaps(), now);
-    if (setup_.tilt) WriteHealth("inclinometer", state(tilts_, false), tilts_, 0, now);
-    if (setup_.camera) WriteHealth("targets", state(images_, false), images_, 0, now);
+    const auto& devices = config_.devices;
+    const std::uint64_t lost = recorder_.not_recorded();
+    WatchLost(WriteHealth(
+        "rail_line", dds::DeviceState::kStreaming, states_.counters().written, lost, now));
+    WriteHealth("imu", state(samples_, IsImuSilent()), samples_, tracker_.gaps(), now);
+    if (setup_.tilt) {
+      WatchSilence(RailAlarm::kInclinometerSilent,
+                   devices && devices->inclinometer,
+                   WriteHealth("inclinometer", state(tilts_), tilts_, 0, now));
+    }
+    if (setup_.camera) {
+      WatchSilence(RailAlarm::kTargetsSilent,
+                   devices && devices->has_target_pixels,
+                   WriteHealth("targets", state(images_), images_, 0, now));
+    }
   }
 
-  void WriteHealth(std::string_view device,
-                   dds::DeviceState state,
-                   std::uint64_t good,
-                   std::uint64_t lost,
-                   Timestamp now) {
+  void WatchSilence(RailAlarm alarm, bool is_expected, const dds::DeviceHealth& health) {
+    if (!is_expected) return;
+    Watch(alarm,
+          !has_ended_ && health.state != dds::DeviceState::kStreaming,
+          std::string(health.detail));
+  }
+
+  // What the line will miss.
+  void WatchLost(const dds::DeviceHealth& health) {
+    if (has_ended_) return;
+    alarms_.Watch(RailAlarm::kMeasurementsLost,
+                  static_cast<double>(health.samples_lost),
+                  clock_.Now(),
+                  health.samples_lost > 0 ? fmt::format("{} so far", health.samples_lost) : "");
+  }
+
+  dds::DeviceHealth WriteHealth(std::string_view device,
+                                dds::DeviceState state,
+                                std::uint64_t good,
+                                std::uint64_t lost,
+                                Timestamp now) {
     dds::DeviceHealth health;
     health.state = state;
     health.samples_good = good;
@@ -397,6 +323,7 @@ class RailLineProcess::Impl {
     health.state_since = since.at;
     health.published_at = now;
     health_.Write(health);
+    return health;
   }
 
   void TellAlarms(bool all, Timestamp now) {
@@ -420,6 +347,9 @@ class RailLineProcess::Impl {
     event.active = active;
     event.text = std::string_view(text);
     Tell(event);
+  }
+  void TellOnce(std::string_view code, dds::Severity severity, const std::string& text) {
+    Tell(code, severity, false, text);
   }
 
   void ObeyAll() {
@@ -471,67 +401,96 @@ class RailLineProcess::Impl {
       Watch(RailAlarm::kRunNotWritten, true, *failed);
       return ExitCode::kBadInput;
     }
-    Tell("run_ended",
-         dds::Severity::kInfo,
-         false,
-         fmt::format("{}: {} samples", recorder_.folder(), recorder_.samples()));
-    std::future<Outcome> making = std::async(
-        std::launch::async, [this] { return MakeLine(config_, recorder_.folder(), run_id_); });
+    TellOnce("run_ended",
+             dds::Severity::kInfo,
+             fmt::format("{}: {} samples", recorder_.folder(), recorder_.samples()));
+    std::future<RailOutcome> making =
+        std::async(std::launch::async, [this] { return MakeOutcome(config_, folders_, run_id_); });
     while (making.wait_for(kTick) != std::future_status::ready) {
       BeatWhenDue();
       if (on_alive) on_alive();
     }
-    const Outcome outcome = making.get();
+    const RailOutcome outcome = making.get();
+    TellWarnings(outcome.warnings);
     if (!outcome.line) {
-      fmt::print(stderr, "{}", outcome.trouble);
-      Watch(RailAlarm::kLineNotWritten, true, FirstLine(outcome.trouble));
+      for (const std::string& trouble : outcome.troubles) {
+        fmt::print(stderr, "{}: {}\n", run_id_, trouble);
+      }
+      Watch(RailAlarm::kLineNotWritten, true, outcome.troubles.front());
       return ExitCode::kBadInput;
     }
-    TellLine(outcome);
+    TellLine(*outcome.line);
+    TellComparison(outcome);
     return ExitCode::kDone;
   }
 
-  void TellLine(const Outcome& outcome) {
+  // All of them stand in the log; who listens gets the first few.
+  void TellWarnings(const std::vector<std::string>& warnings) {
+    for (std::size_t i = 0; i < warnings.size(); ++i) {
+      if (i < kMostWarningsTold) {
+        TellOnce("line_warning", dds::Severity::kWarning, warnings[i]);
+      } else {
+        fmt::print(stderr, "{}: {}\n", run_id_, warnings[i]);
+      }
+    }
+    if (warnings.size() <= kMostWarningsTold) return;
+    TellOnce("line_warning",
+             dds::Severity::kWarning,
+             fmt::format("and {} more; tbm line says them", warnings.size() - kMostWarningsTold));
+  }
+
+  void TellLine(const FinishedLine& line) {
     const Timestamp now = clock_.Now();
-    for (dds::RailLinePiece& piece : PiecesOf(*outcome.line, config_.publish_step_m)) {
+    for (dds::RailLinePiece& piece : PiecesOf(line, config_.publish_step_m)) {
       piece.machine_id = std::string_view(config_.machine_id);
       piece.published_at = now;
       lines_.Write(piece);
     }
-    Tell("line_made",
-         dds::Severity::kInfo,
-         false,
-         fmt::format("{}/{}: {:.3f} m",
-                     config_.lines_folder,
-                     run_id_,
-                     outcome.line->points.back().distance_m));
-    if (!outcome.no_settlement.empty()) {
-      Tell("not_compared", dds::Severity::kWarning, false, outcome.no_settlement);
+    TellOnce(
+        "line_made",
+        dds::Severity::kInfo,
+        fmt::format("{}: {:.3f} m", folders_.LinePath(run_id_), line.points.back().distance_m));
+  }
+
+  void TellComparison(const RailOutcome& outcome) {
+    if (!outcome.no_comparison.empty()) {
+      TellOnce("not_compared", dds::Severity::kWarning, outcome.no_comparison);
     }
-    int highest = 0;
-    for (dds::SettlementPiece piece : outcome.settlement) {
-      highest = piece.highest_alert;
+    if (!outcome.comparison) return;
+    const LineComparison& comparison = *outcome.comparison;
+    const Timestamp now = clock_.Now();
+    for (dds::SettlementPiece piece : comparison.pieces) {
       piece.machine_id = std::string_view(config_.machine_id);
       piece.published_at = now;
       settlements_.Write(piece);
     }
-    alarms_.Watch(
-        RailAlarm::kSettlementFound,
-        highest,
-        now,
-        highest > 0 ? fmt::format("alert {} against {}", highest, config_.base_line) : "");
+    TellOnce("compared",
+             dds::Severity::kInfo,
+             fmt::format("against {}: {}", config_.base_line, comparison.told));
+    const auto watch = [&](RailAlarm alarm, std::size_t size) {
+      const std::string what =
+          size > 0 ? fmt::format("size {}; {}", size, comparison.told) : std::string();
+      alarms_.Watch(alarm, static_cast<double>(size), now, what);
+    };
+    watch(RailAlarm::kSettlementFound, comparison.alert);
+    watch(RailAlarm::kDatumShift, comparison.datum_alert);
   }
 
   // Whoever comes a moment later still gets the line.
-  void Hold(const std::function<void()>& on_alive) {
-    const auto until = clock_.Steady() + std::chrono::duration_cast<steady_clock::duration>(
-                                             std::chrono::duration<double>(config_.hold_s));
+  void Hold(const std::stop_token& stop, const std::function<void()>& on_alive) {
+    const auto begin = clock_.Steady();
+    const auto hold = std::chrono::duration_cast<steady_clock::duration>(
+        std::chrono::duration<double>(config_.hold_s));
     health_due_ = {};
+    const auto is_over = [&] {
+      const auto held = clock_.Steady() - begin;
+      return held >= hold || (stop.stop_requested() && held >= kFarewell);
+    };
     do {
       BeatWhenDue();
       if (on_alive) on_alive();
       std::this_thread::sleep_for(kTick);
-    } while (clock_.Steady() < until);
+    } while (!is_over());
   }
 
   struct DeviceSince {
@@ -541,8 +500,9 @@ class RailLineProcess::Impl {
 
   const RailLineConfig& config_;
   const RailSetup& setup_;
+  RunFolders& folders_;
   const Clock& clock_;
-  const Timestamp started_at_;
+  const EvenClock even_clock_;  // of the instruments
   const std::string run_id_;
   const std::string rail_yaml_sha256_;
   const std::unique_ptr<RailSource> source_;
@@ -552,7 +512,8 @@ class RailLineProcess::Impl {
   std::vector<RailInput> inputs_;
   bool has_ended_ = false;
   bool is_asked_to_end_ = false;
-  steady_clock::time_point heard_at_{};  // the unit
+  Timestamp newest_sample_;
+  steady_clock::time_point heard_at_{};  // the unit, by a newer sample
   steady_clock::time_point state_due_{};
   steady_clock::time_point health_due_{};
   std::uint64_t samples_ = 0;
@@ -580,9 +541,10 @@ class RailLineProcess::Impl {
 RailLineProcess::RailLineProcess(const RailLineConfig& config,
                                  const RailRun& run,
                                  const Texts& texts,
+                                 RunFolders& folders,
                                  dds::Participant& participant,
                                  const Clock& clock)
-    : impl_(std::make_unique<Impl>(config, run, texts, participant, clock)) {}
+    : impl_(std::make_unique<Impl>(config, run, texts, folders, participant, clock)) {}
 RailLineProcess::~RailLineProcess() = default;
 ExitCode RailLineProcess::Run(const std::stop_token& stop, const std::function<void()>& on_alive) {
   return impl_->Run(stop, on_alive);

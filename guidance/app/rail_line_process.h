@@ -7,6 +7,7 @@
 
 #include "guidance/app/exit_code.h"
 #include "guidance/app/rail_run.h"
+#include "guidance/app/run_folders.h"
 #include "guidance/config/rail_line_file.h"
 #include "idl/cpp/alarm.h"
 #include "idl/cpp/participant.h"
@@ -29,15 +30,18 @@ class RailLineProcess {
   };
 
   // All outlive the process. `run`: the one that is played; of instruments its setup and targets.
+  // `folders`: those of the config, taken for this process; released when the line is made.
   RailLineProcess(const RailLineConfig& config,
                   const RailRun& run,
                   const Texts& texts,
+                  RunFolders& folders,
                   dds::Participant& participant,
                   const Clock& clock);
   ~RailLineProcess();
 
-  // Until the run has ended, by itself, by `stop`, or by the command end_run; and the line is made
-  // and told. kBadInput: there is no line, the reason has been told.
+  // Until the run has ended, by itself, by `stop`, or by the command end_run; and the line is made,
+  // told and held (`publish.hold_s`, a second at most where `stop` asks). kBadInput: there is no
+  // line, the reason has been told.
   ExitCode Run(const std::stop_token& stop, const std::function<void()>& on_alive = {});
 
   // What DDS complains of; goes out as an event. From any thread.

@@ -1,5 +1,6 @@
 #include "guidance/app/rail_recorder.h"
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <iterator>
@@ -10,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "devices/replay/run_writer.h"
+#include "guidance/app/csv_field.h"
 
 namespace tbm {
 namespace {
@@ -33,15 +35,17 @@ RailRecorder::RailRecorder(std::string folder, Setup setup, Duration hold_back)
   files_[kTilt].name = "tilt.csv";
   files_[kTilt].header = "stamp_ns,sensor,beta_deg,gamma_deg\n";
   files_[kCentres].name = "centres.csv";
-  files_[kCentres].header = "stamp_ns,target,u_px,v_px\n";
   files_[kOdometer].name = "odometer.csv";
   files_[kOdometer].header = "stamp_ns,distance_m\n";
 }
 
 std::optional<std::string> RailRecorder::Begin() {
   std::error_code error;
-  fs::create_directories(unfinished_, error);
+  const fs::path parent = fs::path(folder_).parent_path();
+  if (!parent.empty()) fs::create_directories(parent, error);
+  const bool is_new = !error && !fs::exists(folder_) && fs::create_directory(unfinished_, error);
   if (error) return Told(unfinished_, error.value());
+  if (!is_new) return folder_ + ": is there already";
   if (const int failed = WriteWhole(PathOf("rail.yaml"), setup_.rail_yaml)) {
     return Told(PathOf("rail.yaml"), failed);
   }
@@ -58,7 +62,11 @@ void RailRecorder::Add(const RailInput& input) {
   if (const auto* sample = std::get_if<ImuSample>(&input)) {
     const Eigen::Vector3d& w = sample->gyro_rad_s;
     const Eigen::Vector3d& f = sample->accel_m_s2;
-    newest_ = std::max(newest_, at);
+    // Put among the samples before, one of a clock that was set back would look like one of them.
+    if (at <= files_[kImu].newest) {
+      ++not_recorded_;
+      return;
+    }
     Keep(kImu,
          at,
          fmt::format("{},{},{},{},{},{},{}\n", at.ns, w.x(), w.y(), w.z(), f.x(), f.y(), f.z()));
@@ -70,58 +78,80 @@ void RailRecorder::Add(const RailInput& input) {
                      DegThatReadsAs(tilt->angles.beta_rad),
                      DegThatReadsAs(tilt->angles.gamma_rad)));
   } else if (const auto* image = std::get_if<TargetImage>(&input)) {
-    std::string rows;
-    std::set<int> seen;
-    for (const TargetPixel& pixel : image->pixels) {
-      if (!seen.insert(pixel.target).second) continue;
-      fmt::format_to(std::back_inserter(rows),
-                     "{},{},{},{}\n",
-                     at.ns,
-                     setup_.targets[static_cast<std::size_t>(pixel.target)],
-                     pixel.pixel_px.x(),
-                     pixel.pixel_px.y());
-    }
-    if (!rows.empty()) Keep(kCentres, at, std::move(rows));
+    KeepCentres(*image);
   } else if (const auto* reading = std::get_if<OdometerReading>(&input)) {
     Keep(kOdometer, at, fmt::format("{},{}\n", at.ns, reading->distance_m));
   }
 }
 
+void RailRecorder::KeepCentres(const TargetImage& image) {
+  const Timestamp at = image.stamped_at;
+  if (!has_sigma_ && !image.pixels.empty()) {
+    has_sigma_ = std::all_of(image.pixels.begin(),
+                             image.pixels.end(),
+                             [](const TargetPixel& pixel) { return pixel.sigma_px > 0.0; });
+    files_[kCentres].header =
+        *has_sigma_ ? "stamp_ns,target,u_px,v_px,sigma_px\n" : "stamp_ns,target,u_px,v_px\n";
+  }
+  std::string rows;
+  std::set<int> seen;
+  for (const TargetPixel& pixel : image.pixels) {
+    if (!seen.insert(pixel.target).second) continue;
+    if (*has_sigma_ && !(pixel.sigma_px > 0.0)) {
+      ++not_recorded_;
+      continue;
+    }
+    fmt::format_to(std::back_inserter(rows),
+                   "{},{},{},{}",
+                   at.ns,
+                   CsvField(setup_.targets[static_cast<std::size_t>(pixel.target)]),
+                   pixel.pixel_px.x(),
+                   pixel.pixel_px.y());
+    rows += *has_sigma_ ? fmt::format(",{}\n", pixel.sigma_px) : "\n";
+  }
+  if (!rows.empty()) Keep(kCentres, at, std::move(rows));
+}
+
 void RailRecorder::Keep(Table table, Timestamp at, std::string rows) {
   File& file = files_[table];
   if (at <= file.written_up_to || file.rows.contains(at)) {
-    ++came_too_late_;
+    ++not_recorded_;
     return;
   }
+  file.newest = std::max(file.newest, at);
   file.rows.emplace(at, std::move(rows));
   if (table == kImu) ++samples_;
 }
 
-std::optional<std::string> RailRecorder::Flush() { return WriteRows(newest_ - hold_back_); }
-
-std::optional<std::string> RailRecorder::WriteRows(Timestamp before) {
+// Each table by its own newest row: one whose instrument is silent holds back no other.
+std::optional<std::string> RailRecorder::Flush() {
   for (File& file : files_) {
-    std::string piece;
-    const auto end = file.rows.lower_bound(before);
-    for (auto row = file.rows.begin(); row != end; ++row) piece += row->second;
-    if (piece.empty()) continue;
-    int failed = 0;
-    if (!file.file.is_open()) {
-      failed = file.file.Create(PathOf(file.name));
-      piece.insert(0, file.header);
-    }
-    if (failed == 0) failed = file.file.Append(piece);
-    if (failed == 0) failed = file.file.Sync();
-    if (failed != 0) return Told(PathOf(file.name), failed);
-    file.written_up_to = std::prev(end)->first;
-    file.rows.erase(file.rows.begin(), end);
+    if (auto failed = WriteRows(file, file.newest - hold_back_)) return failed;
   }
   return {};
 }
 
+std::optional<std::string> RailRecorder::WriteRows(File& file, Timestamp before) {
+  std::string piece;
+  const auto end = file.rows.lower_bound(before);
+  for (auto row = file.rows.begin(); row != end; ++row) piece += row->second;
+  if (piece.empty()) return {};
+  int failed = 0;
+  if (!file.file.is_open()) failed = file.file.Create(PathOf(file.name));
+  if (file.file.size_bytes() == 0) piece.insert(0, file.header);
+  if (failed == 0) failed = file.file.Append(piece);
+  if (failed == 0) failed = file.file.Sync();
+  if (failed != 0) return Told(PathOf(file.name), failed);
+  file.written_up_to = std::prev(end)->first;
+  file.rows.erase(file.rows.begin(), end);
+  return {};
+}
+
 std::optional<std::string> RailRecorder::Finish() {
-  if (auto failed = WriteRows({std::numeric_limits<std::int64_t>::max()})) return failed;
-  for (File& file : files_) file.file.Close();
+  for (File& file : files_) {
+    if (auto failed = WriteRows(file, {std::numeric_limits<std::int64_t>::max()})) return failed;
+    file.file.Close();
+  }
   if (const int failed = SyncFolder(unfinished_)) return Told(unfinished_, failed);
   std::error_code error;
   fs::rename(unfinished_, folder_, error);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <tuple>
 
 namespace tbm {
 namespace {
@@ -52,6 +54,15 @@ std::vector<Piece> Dealt(const Piece& blank, const std::vector<Point>& points) {
     piece.points_in_all = static_cast<std::int32_t>(points.size());
   }
   return pieces;
+}
+
+bool IsLessTelling(const SettlementPlace& a, const SettlementPlace& b) {
+  const auto weight = [](const SettlementPlace& place) {
+    const auto& change = place.changes.back();
+    return std::tuple(
+        place.alert, change && change->is_significant, change ? std::abs(change->dz_m) : -1.0);
+  };
+  return weight(a) < weight(b);
 }
 
 // Every so many of `count`, so that not too many are left.
@@ -122,20 +133,21 @@ std::vector<dds::SettlementPiece> PiecesOf(const Settlement& settlement,
   blank.base_sha256 = std::string_view(base.sha256);
   blank.later_sha256 = std::string_view(later.sha256);
   blank.level = level;
-  const std::size_t stride = StrideOf(settlement.places.size());
-  for (std::size_t i = 0; i < settlement.places.size(); ++i) {
-    const SettlementPlace& place = settlement.places[i];
-    const auto alert = static_cast<std::int32_t>(place.alert);
-    blank.highest_alert = std::max(blank.highest_alert, alert);
-    if (i % stride != 0) continue;
+  const std::span places(settlement.places);
+  const std::size_t stride = StrideOf(places.size());
+  for (std::size_t begin = 0; begin < places.size(); begin += stride) {
+    const auto stretch = places.subspan(begin, std::min(stride, places.size() - begin));
+    const SettlementPlace& place = *std::max_element(stretch.begin(), stretch.end(), IsLessTelling);
     dds::SettlementPoint told;
     told.distance_m = place.distance_m;
+    told.alert = static_cast<std::int32_t>(place.alert);
     if (const auto& change = place.changes.back()) {
       told.dz_m = change->dz_m;
       told.sigma_m = change->sigma_m;
-      told.is_significant = change->is_significant;
-      told.alert = change->is_significant ? alert : 0;
+      // Beside a shift of the whole line a place may have moved that is as high as it was.
+      told.is_significant = change->is_significant || place.alert > 0;
     }
+    blank.highest_alert = std::max(blank.highest_alert, told.alert);
     points.push_back(told);
   }
   return Dealt(blank, points);
@@ -152,7 +164,8 @@ std::vector<dds::CalibrationStatus> CalibrationsOf(const RailSetup& setup,
   blank.due_after_days = config.calibration_due_days.value_or(dds::kNaN);
   if (config.calibrated_at) {
     blank.calibrated_at = *config.calibrated_at;
-    blank.age_days = SecondsBetween(*config.calibrated_at, now) / kSecondsPerDay;
+    // Of today it may be ahead: a day begins in Auckland before it does in Greenwich.
+    blank.age_days = std::max(0.0, SecondsBetween(*config.calibrated_at, now) / kSecondsPerDay);
     const bool is_due =
         config.calibration_due_days && blank.age_days > *config.calibration_due_days;
     blank.state = is_due ? dds::CalibrationState::kDue : dds::CalibrationState::kValid;

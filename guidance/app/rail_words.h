@@ -32,7 +32,8 @@ struct FinishedLine {
 // In pieces, thinned out to a point in `step_m`, or in more where there would be too many.
 std::vector<dds::RailLinePiece> PiecesOf(const FinishedLine& line, double step_m);
 
-// `settlement` of two epochs. No pieces where there is no place.
+// `settlement` of two epochs. No pieces where there is no place. Where there are too many places,
+// the worst of every few: no alert is thinned out.
 std::vector<dds::SettlementPiece> PiecesOf(const Settlement& settlement,
                                            const FinishedLine& base,
                                            const FinishedLine& later,

@@ -14,6 +14,7 @@
 #include "guidance/app/gnuplot.h"
 #include "guidance/app/line_file.h"
 #include "guidance/app/output_file.h"
+#include "guidance/app/settlement_words.h"
 
 namespace tbm {
 namespace {
@@ -87,27 +88,6 @@ std::vector<LineFile> ReadEpochs(const SettleRequest& request, const Console& co
   return lines;
 }
 
-FileFault Explain(const SettlementFailure& failure, const std::vector<LineFile>& lines) {
-  const LineFile& line = lines[failure.epoch];
-  switch (failure.fault) {
-    case SettlementFault::kNoLine:
-      return {line.file, 0, "distance_m", "no part of it is as long as a step"};
-    case SettlementFault::kTurnsBack:
-      return {line.file,
-              line.line_of_point[failure.point],
-              "x_m",
-              "the trolley runs back here; give a line that runs one way"};
-    case SettlementFault::kNoOverlap:
-      return {line.file,
-              0,
-              "x_m",
-              fmt::format("no part of the line is within half a metre, in plan, of {}: another "
-                          "track, or coordinates of another frame",
-                          lines.front().file)};
-  }
-  return {};
-}
-
 std::string Header(const Settlement& settlement, bool has_alert) {
   std::string text = "distance_m,dz_mm,sigma_mm,significant";
   if (has_alert) text += ",alert";
@@ -153,14 +133,9 @@ std::string Table(const Settlement& settlement, const SettleRequest& request) {
   return text;
 }
 
-std::string PeakText(std::string_view what, const SettlementPeak& peak) {
-  return fmt::format("  {} {:.2f} mm +- {:.2f} at {:.2f} m; significant from {:.2f} to {:.2f} m\n",
-                     what,
-                     1e3 * std::abs(peak.dz_m),
-                     1e3 * peak.sigma_m,
-                     peak.distance_m,
-                     peak.from_m,
-                     peak.to_m);
+std::string PeakLine(std::string_view what, const SettlementPeak& peak) {
+  return fmt::format(
+      "  {}; significant from {:.2f} to {:.2f} m\n", PeakText(what, peak), peak.from_m, peak.to_m);
 }
 
 std::string EpochText(const EpochSummary& epoch, const LineFile& line, const Settlement& all) {
@@ -170,14 +145,11 @@ std::string EpochText(const EpochSummary& epoch, const LineFile& line, const Set
                                  all.places.size(),
                                  epoch.significant);
   if (epoch.datum) {
-    text += fmt::format("  the datum may have moved: the whole line is {:.2f} mm +- {:.2f} {}\n",
-                        1e3 * std::abs(epoch.datum->dz_m),
-                        1e3 * epoch.datum->sigma_m,
-                        epoch.datum->dz_m < 0.0 ? "lower" : "higher");
+    text += fmt::format("  the datum may have moved: {}\n", ShiftText(*epoch.datum));
   }
-  if (epoch.settlement) text += PeakText("settlement", *epoch.settlement);
-  if (epoch.heave) text += PeakText("heave", *epoch.heave);
-  if (!epoch.settlement && !epoch.heave) {
+  if (epoch.settlement) text += PeakLine("settlement", *epoch.settlement);
+  if (epoch.heave) text += PeakLine("heave", *epoch.heave);
+  if (!epoch.datum && !epoch.settlement && !epoch.heave) {
     text += "  nothing moved that chance would not give somewhere on a line of this length\n";
   }
   if (epoch.trough) {
@@ -195,19 +167,18 @@ std::string EpochText(const EpochSummary& epoch, const LineFile& line, const Set
 }
 
 std::string TrendText(const Settlement& settlement) {
-  const HeightTrend* fastest = nullptr;
-  double at_m = 0.0;
-  for (const SettlementPlace& place : settlement.places) {
-    if (!place.trend || !place.trend->is_significant) continue;
-    if (fastest && place.trend->rate_m_per_day >= fastest->rate_m_per_day) continue;
-    fastest = &*place.trend;
-    at_m = place.distance_m;
-  }
-  if (fastest == nullptr) return "trend: none is significant\n";
-  return fmt::format("trend: lowest {:.3f} mm a day +- {:.3f} at {:.2f} m\n",
-                     1e3 * fastest->rate_m_per_day,
-                     1e3 * fastest->sigma_m_per_day,
-                     at_m);
+  std::string text;
+  const auto add = [&](std::string_view word, const std::optional<TrendPeak>& peak) {
+    if (!peak) return;
+    text += fmt::format("trend: {} {:.3f} mm a day +- {:.3f} at {:.2f} m\n",
+                        word,
+                        1e3 * peak->trend.rate_m_per_day,
+                        1e3 * peak->trend.sigma_m_per_day,
+                        peak->distance_m);
+  };
+  add("lowest", settlement.sinking);
+  add("highest", settlement.rising);
+  return text.empty() ? "trend: none that chance would not give\n" : text;
 }
 
 std::string AlertText(const Settlement& settlement, const SettleRequest& request) {
@@ -227,7 +198,10 @@ std::string AlertText(const Settlement& settlement, const SettleRequest& request
                         count,
                         first->distance_m);
   }
-  return text.empty() && !request.alert_mm.empty() ? "alert: none\n" : text;
+  if (request.alert_mm.empty()) return "";
+  if (text.empty()) text = "alert: none\n";
+  if (settlement.epochs.back().datum) text += "  counted beside the shift of the whole line\n";
+  return text;
 }
 
 std::string Summary(const Settlement& settlement,

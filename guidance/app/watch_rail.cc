@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "guidance/app/watch_board.h"
 #include "guidance/app/watch_text.h"
+#include "guidance/rail/chance.h"
 #include "idl/cpp/words.h"
 #include "pose/base/angle.h"
 
@@ -72,6 +76,35 @@ bool IsWhole(const Gathered& of) {
 template <class Gathered>
 std::string WholeText(const Gathered& of) {
   return IsWhole(of) ? "whole" : fmt::format("{} of {} pieces", of.pieces.size(), of.newest.pieces);
+}
+
+std::vector<dds::SettlementPoint> ComparedPlaces(
+    const std::map<int, dds::SettlementPiece>& pieces) {
+  std::vector<dds::SettlementPoint> compared;
+  for (const auto& [number, piece] : pieces) {
+    std::copy_if(piece.points.begin(),
+                 piece.points.end(),
+                 std::back_inserter(compared),
+                 [](const dds::SettlementPoint& point) { return std::isfinite(point.dz_m); });
+  }
+  return compared;
+}
+
+// The largest change of those with the highest alert; without an alert, of those that are more than
+// chance gives anywhere on the line.
+std::optional<dds::SettlementPoint> WorstOf(const std::vector<dds::SettlementPoint>& compared,
+                                            double level) {
+  std::optional<dds::SettlementPoint> worst;
+  for (const dds::SettlementPoint& point : compared) {
+    if (point.alert == 0 && !IsMoreThanChance(point.dz_m, point.sigma_m, compared.size(), level)) {
+      continue;
+    }
+    const auto weight = [](const dds::SettlementPoint& of) {
+      return std::pair(of.alert, std::abs(of.dz_m));
+    };
+    if (!worst || weight(point) > weight(*worst)) worst = point;
+  }
+  return worst;
 }
 
 }  // namespace
@@ -161,19 +194,14 @@ void RailBoard::AppendSettlements(const WatchNow& now, std::vector<WatchRow>& ro
     WatchRow row{"settlement " + key, "", "", "", WholeText(of), WatchStyle::kPlain};
     row.value = fmt::format("{} against {}", newest.later_run_id.view(), newest.base_run_id.view());
     if (IsWhole(of)) {
-      const dds::SettlementPoint* worst = nullptr;
-      for (const auto& [number, piece] : of.pieces) {
-        for (const dds::SettlementPoint& point : piece.points) {
-          if (!point.is_significant) continue;
-          if (worst == nullptr || std::abs(point.dz_m) > std::abs(worst->dz_m)) worst = &point;
-        }
-      }
-      if (worst == nullptr) {
-        row.value += ": nothing has moved";
-      } else {
+      const std::vector<dds::SettlementPoint> compared = ComparedPlaces(of.pieces);
+      row.value += fmt::format(": {} of {} places compared", compared.size(), newest.points_in_all);
+      if (const auto worst = WorstOf(compared, newest.level)) {
         row.value +=
-            fmt::format(": {:+.2f} mm at {:.2f} m", worst->dz_m * kMmInM, worst->distance_m);
+            fmt::format(", {:+.2f} mm at {:.2f} m", worst->dz_m * kMmInM, worst->distance_m);
         row.sigma = fmt::format("{:.2f}", worst->sigma_m * kMmInM);
+      } else if (!compared.empty()) {
+        row.value += ", nothing moved that chance would not give";
       }
     }
     if (newest.highest_alert > 0) {

@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include <fmt/format.h>
+
 #include "pose/rig/yaml_section.h"
 
 namespace tbm {
@@ -19,9 +21,13 @@ void ReadOutput(YamlSection& section, std::string_view name, StimOutput* output)
 void ReadImuSection(const YamlNode& node, StimConfig* config) {
   if (!IsSection(node)) return;
   YamlSection section(node);
-  std::string model;
-  section.Require("model", "stim300: a unit with accelerometers");
-  section.Word("model", {"stim300"}, &model);
+  const YamlNode model = section.Require("model", "stim300: a unit with accelerometers");
+  if (const auto text = model.Text(); text && *text != "stim300") {
+    model.Fault(
+        fmt::format("'{}' carries no line: must be stim300, which has accelerometers; "
+                    "stim210 and stim202 have gyros alone",
+                    *text));
+  }
   if (const auto port = section.Require("port", "a device such as /dev/ttyUSB0").Text()) {
     config->port.path = *port;
   }

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
+#include "guidance/rail/chance.h"
 #include "guidance/rail/line_places.h"
 
 namespace tbm {
@@ -13,9 +13,6 @@ namespace {
 constexpr double kSecondsPerDay = 86400.0;
 // So much of the line has to agree with one shift for the datum to be suspected.
 constexpr double kShiftedPart = 0.75;
-
-// How often a normal variable is further from its mean than `sigmas`, to either side.
-double TwoSidedTail(double sigmas) { return std::erfc(std::abs(sigmas) / std::numbers::sqrt2); }
 
 std::optional<HeightTrend> TrendOf(const std::vector<std::optional<PlaceHeight>>& heights,
                                    double bound) {
@@ -71,13 +68,11 @@ Compared ComparedOf(const std::vector<SettlementPlace>& places, std::size_t epoc
 
 // `direction` is -1 for settlement, +1 for heave.
 std::optional<SettlementPeak> PeakOf(const Compared& compared, double direction, double level) {
-  const double count = static_cast<double>(compared.changes.size());
   std::optional<std::size_t> peak;
   for (std::size_t i = 0; i < compared.changes.size(); ++i) {
     const HeightChange& change = compared.changes[i];
     if (direction * change.dz_m <= 0.0) continue;
-    // As many chances as places: Bonferroni's bound holds for errors that hang together as well.
-    if (TwoSidedTail(change.dz_m / change.sigma_m) * count >= 1.0 - level) continue;
+    if (!IsMoreThanChance(change.dz_m, change.sigma_m, compared.changes.size(), level)) continue;
     if (!peak || direction * change.dz_m > direction * compared.changes[*peak].dz_m) peak = i;
   }
   if (!peak) return std::nullopt;
@@ -147,13 +142,47 @@ EpochSummary SummaryOf(const std::vector<SettlementPlace>& places,
   return summary;
 }
 
-std::size_t AlertOf(const HeightChange& change, const std::vector<double>& alert_m) {
-  if (!change.is_significant) return 0;
-  return static_cast<std::size_t>(std::count_if(
-      alert_m.begin(), alert_m.end(), [&](double m) { return std::abs(change.dz_m) >= m; }));
+// `direction` is -1 for what sinks, +1 for what rises.
+std::optional<TrendPeak> TrendPeakOf(const std::vector<SettlementPlace>& places,
+                                     double direction,
+                                     double level) {
+  const auto count = static_cast<std::size_t>(std::count_if(
+      places.begin(), places.end(), [](const SettlementPlace& place) { return !!place.trend; }));
+  std::optional<TrendPeak> peak;
+  for (const SettlementPlace& place : places) {
+    if (!place.trend || direction * place.trend->rate_m_per_day <= 0.0) continue;
+    const HeightTrend& trend = *place.trend;
+    if (!IsMoreThanChance(trend.rate_m_per_day, trend.sigma_m_per_day, count, level)) continue;
+    if (peak && direction * trend.rate_m_per_day <= direction * peak->trend.rate_m_per_day) {
+      continue;
+    }
+    peak = TrendPeak{place.distance_m, trend};
+  }
+  return peak;
+}
+
+// Where the whole line moved, what moved beside it; the sum of two sigmas is the most that the
+// difference can have.
+void SetAlerts(const SettlementOptions& options, Settlement* settlement) {
+  const EpochSummary& last = settlement->epochs.back();
+  const DatumShift shift = last.datum.value_or(DatumShift{});
+  for (SettlementPlace& place : settlement->places) {
+    const auto& change = place.changes.back();
+    if (!change) continue;
+    const double dz_m = change->dz_m - shift.dz_m;
+    const double sigma_m = change->sigma_m + shift.sigma_m;
+    if (IsMoreThanChance(dz_m, sigma_m, last.compared, options.level)) {
+      place.alert = SizesReached(dz_m, options.alert_m);
+    }
+  }
 }
 
 }  // namespace
+
+std::size_t SizesReached(double change_m, std::span<const double> sizes_m) {
+  return static_cast<std::size_t>(std::count_if(
+      sizes_m.begin(), sizes_m.end(), [&](double m) { return std::abs(change_m) >= m; }));
+}
 
 double TwoSidedBound(double level) {
   double low = 0.0;
@@ -196,9 +225,6 @@ Result<Settlement, SettlementFailure> CompareEpochs(std::span<const std::vector<
       compared.changes[i - 1] = HeightChange{dz_m, sigma_m, std::abs(dz_m) > bound * sigma_m};
     }
     if (heights.front()) compared.trend = TrendOf(heights, bound);
-    if (compared.changes.back()) {
-      compared.alert = AlertOf(*compared.changes.back(), options.alert_m);
-    }
     settlement.places.push_back(std::move(compared));
   }
   for (std::size_t epoch = 0; epoch + 1 < epochs.size(); ++epoch) {
@@ -211,6 +237,9 @@ Result<Settlement, SettlementFailure> CompareEpochs(std::span<const std::vector<
     }
     settlement.epochs.push_back(SummaryOf(settlement.places, epoch, options));
   }
+  SetAlerts(options, &settlement);
+  settlement.sinking = TrendPeakOf(settlement.places, -1.0, options.level);
+  settlement.rising = TrendPeakOf(settlement.places, 1.0, options.level);
   return settlement;
 }
 

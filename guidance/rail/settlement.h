@@ -16,7 +16,7 @@ struct SettlementOptions {
   double step_m = 0.1;  // > 0, from place to place along the base line
   double level = 0.95;  // of the two-sided test at each place, between 0 and 1
   // Ascending, > 0: a change of this size or more, up or down, gives the alert 1, 2, ..; only where
-  // it is significant.
+  // it is more than chance gives anywhere on the line, and beside what moved the whole line.
   std::vector<double> alert_m;
 };
 
@@ -67,9 +67,17 @@ struct EpochSummary {
   std::optional<DatumShift> datum;
 };
 
+// The fastest trend that chance does not give, by the same measure as SettlementPeak.
+struct TrendPeak {
+  double distance_m = 0.0;
+  HeightTrend trend;
+};
+
 struct Settlement {
   std::vector<SettlementPlace> places;
   std::vector<EpochSummary> epochs;  // one for each later epoch
+  std::optional<TrendPeak> sinking;
+  std::optional<TrendPeak> rising;
 };
 
 enum class SettlementFault {
@@ -83,6 +91,9 @@ struct SettlementFailure {
   std::size_t epoch = 0;  // 0: base
   std::size_t point = 0;  // kTurnsBack
 };
+
+// How many of `sizes_m`, ascending, a change reaches, up or down.
+std::size_t SizesReached(double change_m, std::span<const double> sizes_m);
 
 // How many sigma a normal variable leaves, to either side, in 1 - `level` of all cases.
 double TwoSidedBound(double level);

@@ -520,6 +520,35 @@ TEST(WatchBoard, TheTrolleyWithoutAPlaceGivesItsReasonAndSettlementItsAlert) {
   EXPECT_THAT(row.value, HasSubstr("-10.70 mm at 10.60 m"));
 }
 
+TEST(WatchBoard, ASettlementSaysHowMuchWasComparedAndNothingOfChance) {
+  WatchBoard board;
+  dds::SettlementPiece piece = dds::test::FullSettlementPiece();
+  piece.pieces = 1;
+  piece.piece = 1;
+  piece.highest_alert = 0;
+  piece.level = 0.95;
+  piece.points_in_all = 40;
+  piece.points.clear();
+  for (int i = 0; i < 40; ++i) {
+    // One place in twenty is significant by chance, one in eight has not been compared.
+    dds::SettlementPoint point;
+    point.distance_m = 0.1 * i;
+    point.sigma_m = i % 8 == 0 ? dds::kNaN : 4e-4;
+    point.dz_m = i % 8 == 0 ? dds::kNaN : i % 20 == 1 ? -1e-3 : 1e-4;
+    point.is_significant = i % 20 == 1;
+    piece.points.push_back(point);
+  }
+  board.Add(piece, kSteady);
+  const WatchNow now = NowAfter(std::chrono::milliseconds(100));
+  EXPECT_THAT(RowOf(board, now, "settlement machine-21").value,
+              HasSubstr(": 35 of 40 places compared, nothing moved that chance would not give"));
+  piece.points[7].dz_m = -2e-3;
+  piece.points[7].is_significant = true;
+  board.Add(piece, kSteady);
+  EXPECT_THAT(RowOf(board, now, "settlement machine-21").value,
+              HasSubstr(": 35 of 40 places compared, -2.00 mm at 0.70 m"));
+}
+
 TEST(WatchBoard, ACalibrationThatIsDueIsNotShownAsGood) {
   WatchBoard board;
   dds::CalibrationStatus status = dds::test::FullCalibrationStatus();

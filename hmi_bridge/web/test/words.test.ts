@@ -24,7 +24,7 @@ function Reasons(): Set<string> {
   const section = Section(idl, 'Reasons');
   const codes = new Set(FirstCells(section));
   // Fields and messages, named in the same sentences.
-  const others = new Set(['reason', 'reason_code', 'relative_pose', 'frame_features', 'inclination', 'shield_pose', 'guidance', 'station', 'camera', 'station_set_up', 'station_observation', 'trolley_state', 'calibration_status', 'useful_sigma_mm']);
+  const others = new Set(['reason', 'reason_code', 'relative_pose', 'frame_features', 'inclination', 'shield_pose', 'guidance', 'station', 'camera', 'station_set_up', 'station_observation', 'trolley_state', 'calibration_status', 'useful_sigma_mm', 'imu_silent_after_ms']);
   for (const paragraph of section.split('\n\n')) {
     if (!paragraph.startsWith('`reason` of') || paragraph.includes('| ')) continue;
     for (const code of Codes(paragraph)) if (!others.has(code)) codes.add(code);

@@ -4,10 +4,7 @@
 #include <cmath>
 #include <csignal>
 #include <filesystem>
-#include <map>
-#include <mutex>
-#include <random>
-#include <sstream>
+#include <functional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -16,247 +13,31 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "devices/imu/stim_emulator.h"
-#include "guidance/app/line_command.h"
 #include "guidance/app/line_file.h"
-#include "guidance/app/rail_recorder.h"
 #include "guidance/app/rail_run.h"
 #include "guidance/config/sha256.h"
-#include "idl/cpp/publisher.h"
-#include "idl/cpp/rail_messages.h"
-#include "idl/cpp/subscriber.h"
-#include "pose/base/angle.h"
-#include "pose/base/clock.h"
-#include "tests/guidance/rail/rail_generator.h"
-#include "tests/idl/dds_support.h"
+#include "tests/guidance/rail/rail_line_program.h"
 #include "tests/support/process.h"
-#include "tests/support/recorded_run.h"
-#include "tests/support/temp_folder.h"
 
 namespace tbm::test {
 namespace {
 
 using namespace std::chrono_literals;
 using dds::test::Eventually;
-using dds::test::OnLoopback;
 using ::testing::HasSubstr;
 namespace fs = std::filesystem;
 
 constexpr int kDomain = 196;
 
-std::string Rows(const Eigen::Quaterniond& rotation) {
-  const Eigen::Matrix3d m = rotation.toRotationMatrix();
-  std::string text;
-  for (int i = 0; i < 9; ++i) text += fmt::format("{}{}", i > 0 ? ", " : "", m(i / 3, i % 3));
-  return "[" + text + "]";
-}
-
-std::string RailYaml(const RailSetup& setup) {
-  const RailCamera& camera = *setup.camera;
-  const Eigen::Vector3d& p = camera.in_imu_m;
-  const Eigen::Vector3d& start = setup.start.position_world_m;
-  return fmt::format(
-      "imu: {{rate_hz: 200, angle_random_walk_deg_sqrt_h: 0.2, velocity_random_walk_ug_sqrt_hz: 30,"
-      " gyro_bias_deg_h: 30, accel_bias_mg: 1.0}}\n"
-      "tilt: {{rotation: {}, sigma_deg: 0.003}}\n"
-      "camera:\n"
-      "  image_width: 2592\n"
-      "  image_height: 1944\n"
-      "  distortion_model: plumb_bob\n"
-      "  camera_matrix: {{rows: 3, cols: 3, data: [5455, 0, 1295.5, 0, 5455, 971.5, 0, 0, 1]}}\n"
-      "  distortion_coefficients: {{rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}}\n"
-      "  residual_px: 0.1\n"
-      "  rotation: {}\n"
-      "  position_m: [{}, {}, {}]\n"
-      "  sigma_rotation_deg: 0.005\n"
-      "  sigma_position_mm: 0.1\n"
-      "  sigma_time_offset_s: 0.005\n"
-      "start: {{position_m: [{}, {}, {}], sigma_position_mm: 0.1, at_rest_s: {}}}\n",
-      Rows(setup.tilt->housing_from_imu),
-      Rows(camera.camera_from_imu),
-      p.x(),
-      p.y(),
-      p.z(),
-      start.x(),
-      start.y(),
-      start.z(),
-      setup.start.at_rest_s);
-}
-
-std::string TargetsCsv(const std::vector<SurveyedTarget>& targets) {
-  std::string text = "target,x_m,y_m,z_m,sigma_mm\n";
-  for (const SurveyedTarget& target : targets) {
-    const Eigen::Vector3d& p = target.in_world_m;
-    text += fmt::format("{},{},{},{},{}\n", target.name, p.x(), p.y(), p.z(), 1e3 * target.sigma_m);
-  }
-  return text;
-}
-
-// The run as it would have been recorded.
-void WriteRun(const std::string& folder, const GeneratedRun& run) {
-  RailRecorder::Setup setup{RailYaml(run.setup), TargetsCsv(run.recording.targets), {}};
-  for (const SurveyedTarget& target : run.recording.targets) setup.targets.push_back(target.name);
-  RailRecorder recorder(folder, setup, Duration(std::chrono::seconds(1)));
-  ASSERT_EQ(recorder.Begin(), std::nullopt);
-  for (const ImuSample& one : run.recording.imu) recorder.Add(one);
-  for (const TrolleyTilt& one : run.recording.tilts) recorder.Add(one);
-  for (const TargetImage& one : run.recording.images) recorder.Add(one);
-  ASSERT_EQ(recorder.Finish(), std::nullopt);
-}
-
-// The line that `tbm line` makes of a run's folder.
-std::string LineOf(const std::string& run, const std::string& out) {
-  std::ostringstream said;
-  std::ostringstream complaints;
-  EXPECT_EQ(RunLine({.run = run, .out = out}, Console{said, complaints}), ExitCode::kDone)
-      << complaints.str();
-  return ReadText(out);
-}
-
-// All that the process says, as it is heard.
-class Listener {
- public:
-  explicit Listener(int domain)
-      : participant_(OnLoopback(domain, "listener")),
-        states_(participant_,
-                [this](const dds::TrolleyState& m, const dds::SampleFacts&) {
-                  const std::lock_guard lock(mutex_);
-                  states.push_back(m);
-                }),
-        lines_(participant_,
-               [this](const dds::RailLinePiece& m, const dds::SampleFacts&) {
-                 const std::lock_guard lock(mutex_);
-                 pieces[m.piece] = m;
-               }),
-        settlements_(participant_,
-                     [this](const dds::SettlementPiece& m, const dds::SampleFacts&) {
-                       const std::lock_guard lock(mutex_);
-                       settlements[m.piece] = m;
-                     }),
-        calibrations_(participant_,
-                      [this](const dds::CalibrationStatus& m, const dds::SampleFacts&) {
-                        const std::lock_guard lock(mutex_);
-                        calibrations[std::string(m.subject)] = m;
-                      }),
-        alarms_(participant_,
-                [this](const dds::AlarmStatus& m, const dds::SampleFacts&) {
-                  const std::lock_guard lock(mutex_);
-                  if (m.phase == dds::AlarmPhase::kUnacknowledged) {
-                    raised[std::string(m.code)] = m;
-                  }
-                }),
-        health_(participant_,
-                [this](const dds::DeviceHealth& m, const dds::SampleFacts&) {
-                  const std::lock_guard lock(mutex_);
-                  health[std::string(m.device_id)] = m;
-                }),
-        replies_(participant_,
-                 [this](const dds::CommandReply& m, const dds::SampleFacts&) {
-                   const std::lock_guard lock(mutex_);
-                   replies.push_back(m);
-                 }),
-        commands_(participant_) {}
-
-  template <class Is>
-  bool Has(const Is& is) {
-    const std::lock_guard lock(mutex_);
-    return is(*this);
-  }
-  bool HasStatus(dds::RailPointStatus status) {
-    const std::lock_guard lock(mutex_);
-    return std::any_of(
-        states.begin(), states.end(), [&](const auto& m) { return m.status == status; });
-  }
-  bool HasReason(std::string_view reason) {
-    const std::lock_guard lock(mutex_);
-    return std::any_of(
-        states.begin(), states.end(), [&](const auto& m) { return m.reason.view() == reason; });
-  }
-  void Ask(std::string_view verb) {
-    const SystemClock clock;
-    dds::Command command;
-    command.machine_id = "trolley-1";
-    const std::string id = fmt::format("request-{}", ++asked_);
-    command.request_id = std::string_view(id);
-    command.addressee = "rail_line";
-    command.verb = verb;
-    command.by = "S. Urveyor";
-    command.issued_at = clock.Now();
-    command.expires_at = clock.Now() + Duration(std::chrono::seconds(20));
-    commands_.Write(command);
-  }
-  bool IsHeardByIt() const { return commands_.matched_readers() > 0; }
-
- private:
-  dds::Participant participant_;
-  std::mutex mutex_;  // guards the lists below while they grow
-  int asked_ = 0;
-
- public:
-  std::vector<dds::TrolleyState> states;
-  std::map<int, dds::RailLinePiece> pieces;
-  std::map<int, dds::SettlementPiece> settlements;
-  std::map<std::string, dds::CalibrationStatus> calibrations;
-  std::map<std::string, dds::AlarmStatus> raised;
-  std::map<std::string, dds::DeviceHealth> health;
-  std::vector<dds::CommandReply> replies;
-
- private:
-  dds::Subscriber<dds::TrolleyState> states_;
-  dds::Subscriber<dds::RailLinePiece> lines_;
-  dds::Subscriber<dds::SettlementPiece> settlements_;
-  dds::Subscriber<dds::CalibrationStatus> calibrations_;
-  dds::Subscriber<dds::AlarmStatus> alarms_;
-  dds::Subscriber<dds::DeviceHealth> health_;
-  dds::Subscriber<dds::CommandReply> replies_;
-  dds::Publisher<dds::Command> commands_;
-};
-
-class RailLineProgram : public testing::Test {
- protected:
-  static void SetUpTestSuite() { generated_ = new GeneratedRun(GenerateRail({.seed = 11})); }
-  static void TearDownTestSuite() { delete generated_; }
-
-  RailLineProgram() { WriteRun(folder_ / "played", *generated_); }
-
-  std::string Config(int domain, double speed, const std::string& more = "") {
-    WriteText(folder_ / "rail_line.yaml",
-              fmt::format("machine_id: trolley-1\nruns: runs\nlines: lines\n"
-                          "replay: {{run: played, speed: {}, image_delay_ms: 50}}\n"
-                          "dds: {{domain: {}}}\n{}",
-                          speed,
-                          domain,
-                          more));
-    return folder_ / "rail_line.yaml";
-  }
-  // Of one kind, finished ones: the only one's path.
-  std::string OnlyOne(const std::string& where) const {
-    std::vector<std::string> found = All(where);
-    EXPECT_EQ(found.size(), 1u) << where;
-    return found.empty() ? "" : found.front();
-  }
-  std::vector<std::string> All(const std::string& where) const {
-    std::vector<std::string> found;
-    std::error_code ignored;
-    for (const auto& entry : fs::directory_iterator(folder_ / where, ignored)) {
-      found.push_back(entry.path());
-    }
-    return found;
-  }
-
-  TempFolder folder_;
-  static const GeneratedRun* generated_;
-};
-const GeneratedRun* RailLineProgram::generated_ = nullptr;
-
 TEST_F(RailLineProgram, FollowsARunAndLeavesTheLineThatTbmLineMakes) {
-  // An earlier line, which lay 4 mm higher.
+  // An earlier line, which lay up to 4 mm higher, over a part of its length.
   const std::string before = LineOf(folder_ / "played", folder_ / "now.csv");
-  auto earlier = GenerateRail({.seed = 12});
-  for (SurveyedTarget& target : earlier.recording.targets) target.in_world_m.z() += 0.004;
-  earlier.setup.start.position_world_m.z() += 0.004;
-  WriteRun(folder_ / "earlier", earlier);
-  LineOf(folder_ / "earlier", folder_ / "base.csv");
+  WriteRun(folder_ / "earlier", GenerateRail({.seed = 12}));
+  const std::string earlier = LineOf(folder_ / "earlier", folder_ / "earlier.csv");
+  const double length_m = ReadLineFile(folder_ / "earlier.csv")->points.back().distance_m;
+  WriteText(folder_ / "base.csv", Raised(earlier, [&](double m) {
+              return 0.004 * std::exp(-0.5 * std::pow((m / length_m - 0.5) / 0.08, 2));
+            }));
 
   Listener listener(kDomain);
   Process process({TBM_RAIL_LINE,
@@ -316,14 +97,22 @@ TEST_F(RailLineProgram, FollowsARunAndLeavesTheLineThatTbmLineMakes) {
   EXPECT_LT(std::sqrt(squares / count), 3.0);
   EXPECT_EQ(listener.states.back().reason, "ended");
 
-  // 4 mm: found, and of the second size.
+  // 4 mm: found where they are, and of the second size.
   ASSERT_FALSE(listener.settlements.empty());
-  EXPECT_EQ(listener.settlements.begin()->second.highest_alert, 2);
-  EXPECT_EQ(listener.settlements.begin()->second.base_sha256.view(),
-            Sha256(ReadText(folder_ / "base.csv")));
-  EXPECT_TRUE(listener.raised.contains("settlement_found"));
+  const dds::SettlementPiece& piece = listener.settlements.begin()->second;
+  EXPECT_EQ(piece.highest_alert, 2);
+  EXPECT_EQ(piece.base_sha256.view(), Sha256(ReadText(folder_ / "base.csv")));
+  for (const dds::SettlementPoint& point : piece.points) {
+    if (point.alert > 0) {
+      EXPECT_NEAR(point.distance_m / length_m, 0.5, 0.2);
+    }
+  }
+  EXPECT_THAT(std::string(listener.raised["settlement_found"].cause), HasSubstr("settlement "));
+  EXPECT_FALSE(listener.raised.contains("datum_shift"));
+  EXPECT_THAT(listener.events["compared"], HasSubstr(" places compared; settlement "));
   EXPECT_TRUE(listener.raised.contains("calibration_due"));
   EXPECT_FALSE(listener.raised.contains("imu_silent"));
+  EXPECT_FALSE(listener.raised.contains("measurements_lost"));
   EXPECT_EQ(listener.calibrations.at("imu_mounting").state, dds::CalibrationState::kDue);
   EXPECT_EQ(listener.health.at("imu").samples_good, generated_->recording.imu.size());
   EXPECT_TRUE(listener.health.contains("targets") && listener.health.contains("inclinometer"));
@@ -356,6 +145,17 @@ TEST_F(RailLineProgram, SigtermEndsTheRunInOrder) {
   process.Signal(SIGTERM);
   EXPECT_EQ(process.Wait(), 0) << process.Output();
   EXPECT_TRUE(fs::exists(OnlyOne("lines") + "/line.json"));
+}
+
+TEST_F(RailLineProgram, SigtermAlsoEndsTheHoldOfALine) {
+  Listener listener(kDomain + 1);
+  Process process({TBM_RAIL_LINE, Config(kDomain + 1, 200.0, "publish: {hold_s: 60}\n")});
+  ASSERT_TRUE(Eventually([&] { return listener.HasSaid("line_made"); }, 30s));
+  std::this_thread::sleep_for(1200ms);
+  process.Signal(SIGTERM);
+  const auto asked_at = std::chrono::steady_clock::now();
+  EXPECT_EQ(process.Wait(), 0) << process.Output();
+  EXPECT_LT(std::chrono::steady_clock::now() - asked_at, 20s);
 }
 
 TEST_F(RailLineProgram, KilledItLeavesNothingHalfWrittenAndTheNextOneRuns) {
@@ -409,6 +209,7 @@ TEST_F(RailLineProgram, WithoutTheUnitThereIsNoPlaceAndAnAlarm) {
 TEST_F(RailLineProgram, AStartThatIsNoneGivesNoLineAndSaysWhy) {
   GeneratedRun run = *generated_;
   run.setup.start.at_rest_s = 14.0;
+  run.recording.tilts.clear();  // which is a warning, and no reason
   fs::remove_all(folder_ / "played");
   WriteRun(folder_ / "played", run);
   Listener listener(kDomain + 1);
@@ -422,6 +223,13 @@ TEST_F(RailLineProgram, AStartThatIsNoneGivesNoLineAndSaysWhy) {
       15s));
   EXPECT_EQ(process.Wait(), 2);
   EXPECT_TRUE(listener.HasReason("start_failed"));
+  // Each says why, and not first what is odd beside it.
+  EXPECT_THAT(std::string(listener.raised["start_failed"].cause), HasSubstr("the trolley moves 1"));
+  EXPECT_THAT(std::string(listener.raised["line_not_written"].cause),
+              HasSubstr("the trolley moves 1"));
+  EXPECT_THAT(listener.events["start_failed"], HasSubstr("start.at_rest_s: 14"));
+  EXPECT_THAT(listener.events["line_not_written"], HasSubstr("start.at_rest_s: 14"));
+  EXPECT_THAT(listener.events["line_warning"], HasSubstr("tilt.csv: is not there"));
   EXPECT_THAT(process.Output(), HasSubstr("start.at_rest_s: 14"));
   EXPECT_TRUE(All("lines").empty());
 }
@@ -446,29 +254,11 @@ TEST_F(RailLineProgram, FollowsARealUnitAndTheTargetsOfACameraBox) {
                         folder_ / "imu",
                         domain));
 
-  // What the generated trolley's unit shows at rest.
-  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < 1000; ++i) {
-    rate += 1e-3 * generated_->recording.imu[i].gyro_rad_s;
-    force += 1e-3 * generated_->recording.imu[i].accel_m_s2;
-  }
-  const auto truth = [=](Timestamp at) {
-    std::mt19937_64 engine(static_cast<std::uint64_t>(at.ns));
-    std::normal_distribution<double> normal;
-    const auto noise = [&](double sigma) {
-      return Eigen::Vector3d(
-          sigma * normal(engine), sigma * normal(engine), sigma * normal(engine));
-    };
-    StimReading reading;
-    reading.rate_rad_s = rate + noise(9e-4);
-    reading.specific_force_m_s2 = force + noise(4.6e-3);
-    return reading;
-  };
   const SystemClock clock;
   StimEmulatorSettings settings;
   settings.scales.sample_rate_hz = 250.0;
-  StimEmulator unit({folder_ / "imu", 921600, Parity::kNone, 1}, settings, truth, clock);
+  StimEmulator unit(
+      {folder_ / "imu", 921600, Parity::kNone, 1}, settings, AtRest(*generated_), clock);
   ASSERT_TRUE(unit.IsUp());
 
   Listener listener(domain);
@@ -517,6 +307,13 @@ TEST_F(RailLineProgram, FollowsARealUnitAndTheTargetsOfACameraBox) {
     });
   }));
 
+  // The box dies: the place still comes, and somebody is told.
+  EXPECT_TRUE(Eventually([&] { return listener.HasRaised("targets_silent"); }, 20s));
+  EXPECT_FALSE(listener.HasRaised("imu_silent"));
+  EXPECT_TRUE(listener.Has([](const Listener& heard) {
+    return heard.health.at("targets").state == dds::DeviceState::kSilent;
+  }));
+
   unit.Unplug();
   EXPECT_TRUE(Eventually(
       [&] {
@@ -531,6 +328,8 @@ TEST_F(RailLineProgram, FollowsARealUnitAndTheTargetsOfACameraBox) {
   EXPECT_EQ(process.Wait(), 0) << process.Output();
   EXPECT_EQ(LineOf(OnlyOne("runs"), folder_ / "again.csv"),
             ReadText(OnlyOne("lines") + "/line.csv"));
+  EXPECT_THAT(ReadText(OnlyOne("runs") + "/centres.csv"),
+              testing::MatchesRegex("stamp_ns,target,u_px,v_px,sigma_px\n([^\n]+,0.1\n)+"));
 }
 
 }  // namespace

@@ -37,13 +37,14 @@ const std::string kHeader =
 
 struct Line {
   int day = 0;
+  int draw = 0;  // of the noise
   double length_m = 40.0;
   double noise_m = 0.0;
   std::function<double(double)> up_m = [](double) { return 0.0; };
 };
 
 std::string Text(const Line& line) {
-  Random random("settle command", static_cast<std::uint64_t>(line.day));
+  Random random("settle command", static_cast<std::uint64_t>(line.day + 1000 * line.draw));
   std::string text = kHeader;
   const int count = static_cast<int>(std::lround(line.length_m / 0.05));
   for (int i = 0; i <= count; ++i) {
@@ -108,11 +109,67 @@ TEST_F(SettleCommand, SaysThatNothingMoved) {
   EXPECT_THAT(outcome.out, Not(HasSubstr("trough")));
 }
 
+// Four epochs of 401 places, 40 times: how often each part of the summary speaks.
+struct Spoken {
+  int summary = 0;
+  int alert = 0;
+  int trend = 0;
+};
+constexpr int kDraws = 40;
+
+Spoken SpokenOf(const TempFolder& folder, const std::function<double(double)>& sunk_by_60_m) {
+  Spoken spoken;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    SettleRequest request;
+    request.base = folder / "base.csv";
+    WriteText(request.base, Text({.draw = draw, .noise_m = 3e-4}));
+    for (const int day : {20, 40, 60}) {
+      request.later.push_back(folder / fmt::format("day_{}.csv", day));
+      const auto up_m = [&](double m) { return day / 60.0 * sunk_by_60_m(m); };
+      WriteText(request.later.back(),
+                Text({.day = day, .draw = draw, .noise_m = 3e-4, .up_m = up_m}));
+    }
+    request.out = folder / "settlement.csv";
+    request.alert_mm = {0.5, 2.0};
+    request.force = true;
+    const Outcome outcome = Ran(RunSettle, request);
+    EXPECT_EQ(outcome.code, ExitCode::kDone) << outcome.err;
+    const auto says = [&](const std::string& text) {
+      return outcome.out.find(text) != std::string::npos ? 1 : 0;
+    };
+    const std::string last = outcome.out.substr(outcome.out.find("day_60.csv: "));
+    spoken.summary += last.find("nothing moved") == std::string::npos ? 1 : 0;
+    spoken.alert += 1 - says("alert: none");
+    spoken.trend += 1 - says("trend: none");
+  }
+  return spoken;
+}
+
+// At most 5 % each; of 40 that is beyond 6 in 0.3 % of all cases.
+TEST_F(SettleCommand, WhatDidNotMoveIsRarelySaidToMove) {
+  const Spoken spoken = SpokenOf(folder_, [](double) { return 0.0; });
+  EXPECT_LE(spoken.summary, 6);
+  EXPECT_LE(spoken.alert, 6);
+  EXPECT_LE(spoken.trend, 6);
+}
+
+TEST_F(SettleCommand, ATroughIsAlwaysFound) {
+  const Spoken spoken = SpokenOf(folder_, Trough);
+  EXPECT_EQ(spoken.summary, kDraws);
+  EXPECT_EQ(spoken.alert, kDraws);
+  EXPECT_EQ(spoken.trend, kDraws);
+}
+
 TEST_F(SettleCommand, SaysThatTheDatumMayHaveMoved) {
   const auto raised = [](double) { return 0.002; };
   const Outcome outcome = Ran(RunSettle, Request({{.day = 30, .noise_m = 3e-4, .up_m = raised}}));
   EXPECT_THAT(outcome.out, HasSubstr("the datum may have moved: the whole line is "));
   EXPECT_THAT(outcome.out, HasSubstr("+- 0.42 higher"));
+  SettleRequest request = Request({{.day = 31, .noise_m = 3e-4, .up_m = raised}});
+  request.alert_mm = {1.0};
+  request.out = folder_ / "with_alert.csv";
+  EXPECT_THAT(Ran(RunSettle, request).out,
+              HasSubstr("alert: none\n  counted beside the shift of the whole line\n"));
 }
 
 TEST_F(SettleCommand, SeveralEpochsInTheOrderOfTimeWithTrendAndAlerts) {
@@ -150,6 +207,7 @@ TEST_F(SettleCommand, SeveralEpochsInTheOrderOfTimeWithTrendAndAlerts) {
   EXPECT_EQ(rows[1][4], "none");
   EXPECT_THAT(outcome.out, HasSubstr("alarm: 5 mm or more at "));
   EXPECT_THAT(outcome.out, HasSubstr("trend: lowest -0."));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("trend: highest")));
   EXPECT_THAT(ReadText(request.plot), StartsWith("\x89PNG"));
 }
 

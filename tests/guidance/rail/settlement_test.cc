@@ -280,21 +280,37 @@ TEST(Settlement, TrendOfARestingRailIsRarelySignificant) {
   EXPECT_LT(tolerance, 0.01);
 }
 
-TEST(Settlement, AlertsOnlyWhereSignificant) {
-  const auto line = [](double sigma_m, std::int64_t day, double moved_m) {
-    return Measured(
-        {.to_m = 5.0, .sigma_m = sigma_m, .day = day, .moved_m = [=](double) { return moved_m; }},
-        nullptr);
+// Moved from 1.9 to 3.1 m of 5 m; places[25] is at 2.5 m.
+std::size_t AlertOf(double sigma_m, double moved_m, double shifted_m = 0.0) {
+  const auto moved = [=](double m) {
+    return shifted_m + (std::abs(m - 2.5) < 0.6 ? moved_m : 0.0);
   };
+  const Pass base{.to_m = 5.0, .sigma_m = sigma_m};
+  const Pass later{.to_m = 5.0, .sigma_m = sigma_m, .day = 1, .moved_m = moved};
   const SettlementOptions options{.alert_m = {0.001, 0.003, 0.005}};
-  const auto alert = [&](double sigma_m, double moved_m) {
-    return Compared({line(sigma_m, 0, 0.0), line(sigma_m, 1, moved_m)}, options).places[25].alert;
-  };
-  EXPECT_EQ(alert(1e-4, -0.0009), 0u);
-  EXPECT_EQ(alert(1e-4, -0.0011), 1u);
-  EXPECT_EQ(alert(1e-4, -0.0031), 2u);
-  EXPECT_EQ(alert(1e-4, 0.0051), 3u) << "heave counts as well";
-  EXPECT_EQ(alert(4e-3, -0.0051), 0u) << "not significant";
+  const Settlement settlement =
+      Compared({Measured(base, nullptr), Measured(later, nullptr)}, options);
+  EXPECT_EQ(settlement.epochs[0].datum.has_value(), shifted_m != 0.0);
+  EXPECT_EQ(settlement.places[5].alert, 0u);
+  return settlement.places[25].alert;
+}
+
+TEST(Settlement, AlertsOnlyWhereItIsMoreThanChanceAnywhereOnTheLine) {
+  EXPECT_EQ(AlertOf(1e-4, -0.0009), 0u);
+  EXPECT_EQ(AlertOf(1e-4, -0.0011), 1u);
+  EXPECT_EQ(AlertOf(1e-4, -0.0031), 2u);
+  EXPECT_EQ(AlertOf(1e-4, 0.0051), 3u) << "heave counts as well";
+  EXPECT_EQ(AlertOf(4e-3, -0.0051), 0u) << "not significant";
+  // 2.8 sigma: significant for itself, and no wonder among 51 places.
+  EXPECT_EQ(AlertOf(4e-4, -0.0016), 0u);
+  EXPECT_EQ(AlertOf(4e-4, -0.0020), 1u);
+}
+
+TEST(Settlement, AlertsAreBesideAShiftOfTheWholeLine) {
+  EXPECT_EQ(AlertOf(1e-4, 0.0, 0.004), 0u) << "named as the datum, not as the ground";
+  EXPECT_EQ(AlertOf(1e-4, -0.0035, 0.004), 2u);
+  EXPECT_EQ(AlertOf(1e-4, -0.0040, 0.004), 2u) << "as high as it was, while all else rose";
+  EXPECT_EQ(AlertOf(1e-4, -0.0040, -0.004), 2u) << "8 mm, of which the line has 4";
 }
 
 TEST(Settlement, SaysNothingInHolesAndGaps) {
