@@ -263,6 +263,7 @@ Result<RailLine, RailStartFailure> SolveRailLine(const RailSetup& setup,
   if (!rest) return Failure{rest.error()};
   const auto attitude = FindStartAttitude(setup, recording, *rest);
   if (!attitude) return Failure{attitude.error()};
+  if (const auto too_fast = FindTurnsTooFast(setup, recording, *rest)) return Failure{*too_fast};
   const std::vector<RestSpan> rests = FindQuietSpans(setup, recording, *rest);
 
   std::vector<SurveyedTarget> targets = recording.targets;
