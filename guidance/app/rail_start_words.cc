@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "pose/base/angle.h"
+
 namespace tbm {
 namespace {
 
@@ -26,10 +28,30 @@ std::string Explain(const RailStartFailure& failure, const RailSetup& setup) {
           failure.at_s,
           setup.start.at_rest_s);
     case RailStartFault::kWrongRateUnit:
+      if (failure.times < 1.0) {
+        return fmt::format(
+            "imu.csv: the gyros' noise at rest is {:.3f} times what "
+            "imu.angle_random_walk_deg_sqrt_h says: were they turned from degrees into radians "
+            "twice?",
+            failure.times);
+      }
       return fmt::format(
           "imu.csv: the gyros' noise at rest is {:.0f} times what imu.angle_random_walk_deg_sqrt_h "
           "says: are these degrees per second where radians per second belong?",
           failure.times);
+    case RailStartFault::kTurnsTooFast:
+      return fmt::format(
+          "imu.csv: over the run the gyros turn {:.0f} times as far as gravity does in the "
+          "accelerometers: are these degrees per second where radians per second belong?",
+          failure.times);
+    case RailStartFault::kTiltDisagrees:
+      return fmt::format(
+          "tilt.csv: at rest the inclinometer's up lies {:.2f} deg from that of the "
+          "accelerometers, and {:.2f} deg is what their bias and its mounting allow: beta_deg and "
+          "gamma_deg are degrees with up.x = -sin(beta), up.y = +sin(gamma), and rail.yaml has "
+          "tilt.rotation from imu into the housing",
+          RadToDeg(failure.off_rad),
+          RadToDeg(failure.most_rad));
     case RailStartFault::kWrongForce:
       return fmt::format(
           "imu.csv: at rest the accelerometers show {:.3f} times gravity: m/s2 belong there, not g "

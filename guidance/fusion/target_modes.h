@@ -21,17 +21,26 @@ struct TargetView {
 // target; but only few of their combinations move the camera at all. Those become states: numbers
 // of mean 0 and sigma 1 (docs/filter.md, "Targets that are not where they should be").
 //
-// Fills in `by_mode` of the targets with `most` columns, or fewer where fewer matter. Answers what
-// is left out: the root mean square over the views by which the remaining combinations move the
-// camera [m]. Without a view of four targets: no columns, and zero.
+// Fills in `by_mode` of the targets with `most` columns, or fewer where fewer matter. What is left
+// out moves the camera by `left_out_m`: root mean square over the views, of each coordinate in the
+// world; also where a view shows a single target. Without a view: no columns, and zero.
 struct TargetModes {
   int count = 0;
-  double left_out_m = 0.0;
+  Eigen::Vector3d left_out_m = Eigen::Vector3d::Zero();
 };
 TargetModes FindTargetModes(std::span<const TargetView> views,
                             const CameraModel& camera,
                             double residual_px,
                             int most,
                             std::vector<SurveyedTarget>* targets);
+
+// By how much the errors of the survey move the camera of one view whose place only its targets
+// tell [m]: sigma of each coordinate in the world. `level_sigma_rad` > 0: how well gravity tells
+// its attitude; about the vertical little more is known than the targets say.
+Eigen::Vector3d SurveySigma(const TargetView& view,
+                            const CameraModel& camera,
+                            double residual_px,
+                            double level_sigma_rad,
+                            const std::vector<SurveyedTarget>& targets);
 
 }  // namespace tbm

@@ -164,9 +164,12 @@ Result<PixelPrediction, CameraModelFailure> PredictPixel(const PixelExposure& ex
   h = Row::Zero(2, layout.size());
   h.middleCols<3>(FusionLayout::kPosition) = -prediction.by_target_px_per_m;
   h.middleCols<3>(FusionLayout::kVelocity) = late_s * prediction.by_target_px_per_m;
-  // An error of the attitude, seen from the axes at the exposure.
+  // An error of the attitude, seen from the axes at the exposure; a gyro's bias turns them on the
+  // way from there to the stamp.
   h.middleCols<3>(FusionLayout::kAttitude) =
       by_imu * Skew(in_imu) * ExpRotation(late_s * rate).toRotationMatrix();
+  h.middleCols<3>(FusionLayout::kGyroBias) =
+      late_s * by_imu * Skew(in_imu) * ExpRotation(0.5 * late_s * rate).toRotationMatrix();
   if (layout.Has(FusionOption::kTimeOffset) && exposure.is_moving) {
     h.col(layout.At(FusionOption::kTimeOffset)) =
         prediction.by_target_px_per_m * state.motion.velocity_world_m_s -

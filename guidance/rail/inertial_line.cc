@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
+#include "guidance/rail/rail_filter.h"
 #include "guidance/rail/rail_start.h"
 
 namespace tbm {
@@ -37,32 +40,239 @@ Eigen::Quaterniond RungeKutta(const Eigen::Quaterniond& q,
   return next.normalized();
 }
 
-bool IsIn(const std::vector<RestSpan>& spans, Timestamp at) {
-  return std::any_of(spans.begin(), spans.end(), [&](const RestSpan& span) {
-    return span.begins_at <= at && at <= span.ends_at;
-  });
+// A quiet span is rest when the velocity is none within so many of its sigma, and when most of what
+// there was since the last rest is gone: after a long way, or after samples are missing, the first
+// alone would take any even motion for rest.
+constexpr double kSure = 5.0;
+constexpr double kMostLeft = 0.3;
+
+// What FeedUpTo lets happen while samples are missing: read off a filter that knew all before.
+ImuNoise NoiseOfGap(const RailSetup& setup, double gap_s) {
+  const FusionLayout layout;
+  const FusionMatrix nothing = 1e-30 * FusionMatrix::Identity(layout.size(), layout.size());
+  FusionFilter filter(layout, {}, nothing, setup.imu.noise, setup.gravity_m_s2, {0});
+  ImuSample sample;
+  sample.accel_m_s2.z() = setup.gravity_m_s2;
+  FeedUpTo(filter, setup, sample, {std::llround(gap_s * 1e9)}, gap_s);
+  filter.BringForward();
+  ImuNoise noise = setup.imu.noise;
+  // Along the vertical velocity knows nothing of the lean.
+  const int vertical = FusionLayout::kVelocity + 2;
+  const int heading = FusionLayout::kAttitude + 2;
+  noise.velocity_random_walk_m_s = std::sqrt(filter.covariance()(vertical, vertical) / gap_s);
+  noise.angle_random_walk_rad = std::sqrt(filter.covariance()(heading, heading) / gap_s);
+  return noise;
 }
 
-struct Row {
-  double t_s = 0.0;
-  Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();
-  bool rests = false;
+// How the errors of one horizontal axis grow where nothing corrects them: what is wrong with
+// level leans gravity. At the start level and accelerometers agree, so that only what comes later
+// counts, and what the rest at the start could tell of the biases: its noise over its length.
+class Growth {
+ public:
+  using Vector5 = Eigen::Matrix<double, 5, 1>;
+  using Matrix5 = Eigen::Matrix<double, 5, 5>;
+
+  explicit Growth(const RailSetup& setup) : gravity_m_s2_(setup.gravity_m_s2) {
+    const double angle = setup.imu.noise.angle_random_walk_rad;
+    const double velocity = setup.imu.noise.velocity_random_walk_m_s;
+    covariance_(kRate, kRate) = angle * angle / setup.start.at_rest_s;
+    covariance_(kForce, kForce) = velocity * velocity / setup.start.at_rest_s;
+    covariance_(kPosition, kPosition) = setup.start.sigma_position_m * setup.start.sigma_position_m;
+  }
+
+  void Advance(double span_s, const ImuNoise& noise) {
+    Matrix5 step = Matrix5::Identity();
+    step(kLean, kRate) = span_s;
+    step(kVelocity, kLean) = gravity_m_s2_ * span_s;
+    step(kVelocity, kForce) = span_s;
+    step(kPosition, kVelocity) = span_s;
+    step(kPosition, kLean) = 0.5 * gravity_m_s2_ * span_s * span_s;
+    step(kPosition, kForce) = 0.5 * span_s * span_s;
+    covariance_ = (step * covariance_ * step.transpose()).eval();
+    const double angle = noise.angle_random_walk_rad;
+    const double velocity = noise.velocity_random_walk_m_s;
+    const double variance = velocity * velocity * span_s;
+    covariance_(kLean, kLean) += angle * angle * span_s;
+    covariance_(kVelocity, kVelocity) += variance;
+    covariance_(kVelocity, kPosition) += variance * span_s / 2.0;
+    covariance_(kPosition, kVelocity) += variance * span_s / 2.0;
+    covariance_(kPosition, kPosition) += variance * span_s * span_s / 3.0;
+  }
+
+  // The velocity that there should not be is taken off evenly over the last `span_s`, and the way
+  // that it made with it.
+  void Rest(double span_s) {
+    Matrix5 closed = Matrix5::Identity();
+    closed(kPosition, kVelocity) = -0.5 * span_s;
+    closed(kVelocity, kVelocity) = 0.0;
+    covariance_ = (closed * covariance_ * closed.transpose()).eval();
+  }
+
+  // What all errors have in common with that of the position, itself the last of them.
+  Vector5 Common() const { return covariance_.col(kPosition); }
+
+  // Variance of a position `ago_s` before now, once the velocity of now is taken off evenly over
+  // `span_s`; `common` of then.
+  double ClosedVariance(const Vector5& common, double ago_s, double span_s) const {
+    const double of_velocity = gravity_m_s2_ * ago_s * common(kLean) +
+                               0.5 * gravity_m_s2_ * ago_s * ago_s * common(kRate) +
+                               ago_s * common(kForce) + common(kVelocity);
+    const double part_s = 0.5 * (span_s - ago_s) * (span_s - ago_s) / span_s;
+    const double variance = common(kPosition) - 2.0 * part_s * of_velocity +
+                            part_s * part_s * covariance_(kVelocity, kVelocity);
+    return std::max(variance, 0.0);
+  }
+
+  double SigmaVelocity() const { return std::sqrt(covariance_(kVelocity, kVelocity)); }
+  double SigmaPosition() const { return std::sqrt(covariance_(kPosition, kPosition)); }
+
+ private:
+  enum : Eigen::Index { kLean, kRate, kForce, kVelocity, kPosition };
+
+  const double gravity_m_s2_;
+  Matrix5 covariance_ = Matrix5::Zero();
 };
 
-// Velocities with what they should not have at the next rest taken off in equal parts.
-void CloseAtRests(std::vector<Row>* rows) {
-  std::size_t last = 0;  // of the rest before
-  for (std::size_t i = 1; i < rows->size(); ++i) {
-    if (!(*rows)[i].rests) continue;
-    const Eigen::Vector3d off = (*rows)[i].velocity_m_s;
-    const double span_s = (*rows)[i].t_s - (*rows)[last].t_s;
-    for (std::size_t k = last + 1; k < i; ++k) {
-      (*rows)[k].velocity_m_s -= off * ((*rows)[k].t_s - (*rows)[last].t_s) / span_s;
-    }
-    for (std::size_t k = i; k < rows->size(); ++k) (*rows)[k].velocity_m_s -= off;
-    last = i;
+// The quiet spans as time goes by.
+class QuietSpans {
+ public:
+  explicit QuietSpans(std::vector<RestSpan> spans) : spans_(std::move(spans)) {}
+  // Number of the span that `at` lies in; -1: in none. In the order of time.
+  int At(Timestamp at) {
+    while (next_ < spans_.size() && spans_[next_].ends_at < at) ++next_;
+    const bool is_in = next_ < spans_.size() && spans_[next_].begins_at <= at;
+    return is_in ? static_cast<int>(next_) : -1;
   }
-}
+
+ private:
+  const std::vector<RestSpan> spans_;
+  std::size_t next_ = 0;
+};
+
+class Integration {
+ public:
+  Integration(const RailSetup& setup,
+              const RestSignature& rest,
+              const Eigen::Quaterniond& world_from_imu,
+              std::vector<RestSpan> quiet,
+              const ImuSample& first)
+      : setup_(setup),
+        gyro_bias_rad_s_(rest.mean_gyro_rad_s),
+        gravity_m_s2_(0.0, 0.0, -setup.gravity_m_s2),
+        accel_bias_m_s2_(rest.mean_accel_m_s2 + world_from_imu.conjugate() * gravity_m_s2_),
+        begin_(BeginOfRun(first)),
+        quiet_(std::move(quiet)),
+        growth_(setup),
+        world_from_imu_(world_from_imu),
+        rate_before_rad_s_(first.gyro_rad_s - gyro_bias_rad_s_),
+        now_(begin_) {}
+
+  void Feed(const ImuSample& sample) {
+    const double span_s = SecondsBetween(now_, sample.ends_at);
+    const double gap_s = GapBefore(setup_, now_, sample);
+    now_ = sample.ends_at;
+    const double t_s = SecondsBetween(begin_, now_);
+    // Also a trolley that rested may have been moved while samples are missing.
+    const bool at_start = t_s <= setup_.start.at_rest_s && gap_s <= 0.0;
+    if (!at_start) Advance(sample, span_s, gap_s);
+    rate_before_rad_s_ = sample.gyro_rad_s - gyro_bias_rad_s_;
+    const bool rests = at_start || JudgeRest(gap_s);
+    rows_.push_back({t_s, velocity_m_s_, growth_.Common(), growth_.SigmaPosition()});
+    if (rests) CloseVelocities();
+    RailPoint point{.at = now_, .world_from_imu = world_from_imu_};
+    point.status = rests ? RailStatus::kFixed : RailStatus::kOpen;
+    if (gap_s > 0.0) point.status = RailStatus::kGap;
+    line_.points.push_back(point);
+  }
+
+  // Sums up position and distance: now all velocities are known. A wrong heading leads aside.
+  RailLine Finish() {
+    Eigen::Vector3d position_m = setup_.start.position_world_m;
+    double distance_m = 0.0;
+    const double heading_rad = setup_.start.heading_rad ? setup_.start.sigma_heading_rad
+                                                        : setup_.camera->sigma_rotation_rad;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      RailPoint& point = line_.points[i];
+      if (i > 0 && point.status != RailStatus::kFixed) {
+        const Eigen::Vector3d step_m = 0.5 * (rows_[i].t_s - rows_[i - 1].t_s) *
+                                       (rows_[i - 1].velocity_m_s + rows_[i].velocity_m_s);
+        position_m += step_m;
+        distance_m += step_m.norm();
+      }
+      point.position_world_m = position_m;
+      point.distance_m = distance_m;
+      const Eigen::Vector3d way_m = position_m - setup_.start.position_world_m;
+      const Eigen::Vector3d aside_m(heading_rad * way_m.y(), heading_rad * way_m.x(), 0.0);
+      const Eigen::Vector3d grown_m = Eigen::Vector3d::Constant(rows_[i].sigma_m);
+      point.sigma_world_m = (grown_m.cwiseAbs2() + aside_m.cwiseAbs2()).cwiseSqrt();
+    }
+    return std::move(line_);
+  }
+
+ private:
+  struct Row {
+    double t_s = 0.0;
+    Eigen::Vector3d velocity_m_s;
+    Growth::Vector5 common;
+    double sigma_m = 0.0;  // of the position
+  };
+
+  void Advance(const ImuSample& sample, double span_s, double gap_s) {
+    const Eigen::Quaterniond before = world_from_imu_;
+    world_from_imu_ =
+        RungeKutta(before, rate_before_rad_s_, sample.gyro_rad_s - gyro_bias_rad_s_, span_s);
+    const Eigen::Vector3d force = sample.accel_m_s2 - accel_bias_m_s2_;
+    velocity_m_s_ += span_s * (0.5 * (before * force + world_from_imu_ * force) + gravity_m_s2_);
+    fastest_m_s_ = std::max(fastest_m_s_, velocity_m_s_.norm());
+    growth_.Advance(span_s, gap_s > 0.0 ? NoiseOfGap(setup_, gap_s) : setup_.imu.noise);
+  }
+
+  // Once for each quiet span, when it begins: an even motion is as quiet as rest.
+  bool JudgeRest(double gap_s) {
+    const int span = gap_s > 0.0 ? -1 : quiet_.At(now_);
+    if (span >= 0 && span != judged_) {
+      const double most_m_s =
+          std::min(kSure * growth_.SigmaVelocity(), kMostLeft * fastest_m_s_) + kStill_m_s;
+      judged_rest_ = velocity_m_s_.norm() <= most_m_s;
+    }
+    judged_ = span;
+    return span >= 0 && judged_rest_;
+  }
+
+  // What the velocity should not have is taken off all since the rest before in equal parts.
+  void CloseVelocities() {
+    const double begin_s = rows_[last_rest_].t_s;
+    const double span_s = rows_.back().t_s - begin_s;
+    for (std::size_t i = last_rest_ + 1; i < rows_.size(); ++i) {
+      Row& row = rows_[i];
+      row.velocity_m_s -= velocity_m_s_ * (row.t_s - begin_s) / span_s;
+      const double ago_s = rows_.back().t_s - row.t_s;
+      row.sigma_m = std::sqrt(growth_.ClosedVariance(row.common, ago_s, span_s));
+    }
+    growth_.Rest(span_s);
+    velocity_m_s_.setZero();
+    fastest_m_s_ = 0.0;
+    last_rest_ = rows_.size() - 1;
+  }
+
+  const RailSetup& setup_;
+  const Eigen::Vector3d gyro_bias_rad_s_;
+  const Eigen::Vector3d gravity_m_s2_;
+  const Eigen::Vector3d accel_bias_m_s2_;
+  const Timestamp begin_;
+  QuietSpans quiet_;
+  Growth growth_;
+  Eigen::Quaterniond world_from_imu_;
+  Eigen::Vector3d velocity_m_s_ = Eigen::Vector3d::Zero();
+  double fastest_m_s_ = 0.0;  // since the last rest
+  Eigen::Vector3d rate_before_rad_s_;
+  Timestamp now_;
+  int judged_ = -1;  // quiet span for which judged_rest_ holds
+  bool judged_rest_ = false;
+  std::size_t last_rest_ = 0;
+  std::vector<Row> rows_;
+  RailLine line_;
+};
 
 }  // namespace
 
@@ -72,68 +282,11 @@ Result<RailLine, RailStartFailure> SolveInertialLine(const RailSetup& setup,
   if (!rest) return Failure{rest.error()};
   const auto attitude = FindStartAttitude(setup, recording, *rest);
   if (!attitude) return Failure{attitude.error()};
-  const Eigen::Vector3d gravity_m_s2(0.0, 0.0, -setup.gravity_m_s2);
-  const Eigen::Vector3d accel_bias_m_s2 =
-      rest->mean_accel_m_s2 + attitude->conjugate() * gravity_m_s2;
-  const std::vector<RestSpan> rests = FindQuietSpans(setup, recording, *rest);
-  const ImuSample& first = recording.imu.front();
-  const Timestamp begin = first.ends_at - Duration(std::llround(first.interval_s * 1e9));
-
-  RailLine line;
-  std::vector<Row> rows;
-  Eigen::Quaterniond q = *attitude;
-  Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();
-  Eigen::Vector3d rate_before = first.gyro_rad_s - rest->mean_gyro_rad_s;
-  for (const ImuSample& sample : recording.imu) {
-    const double t_s = SecondsBetween(begin, sample.ends_at);
-    const bool at_start = t_s <= setup.start.at_rest_s;
-    const Eigen::Vector3d rate = sample.gyro_rad_s - rest->mean_gyro_rad_s;
-    if (!at_start) {
-      const Eigen::Quaterniond before = q;
-      q = RungeKutta(q, rate_before, rate, sample.interval_s);
-      const Eigen::Vector3d force = sample.accel_m_s2 - accel_bias_m_s2;
-      velocity_m_s += sample.interval_s * (0.5 * (before * force + q * force) + gravity_m_s2);
-    }
-    rate_before = rate;
-    rows.push_back({t_s, velocity_m_s, at_start || IsIn(rests, sample.ends_at)});
-    line.points.push_back({.at = sample.ends_at, .world_from_imu = q});
-  }
-  CloseAtRests(&rows);
-
-  Eigen::Vector3d position_m = setup.start.position_world_m;
-  double distance_m = 0.0;
-  double open_s = 0.0;  // since the last rest
-  // What the rest could tell of the biases: its noise over its length. An error of the gyros' leans
-  // gravity, and so does their noise.
-  const double velocity_walk = setup.imu.noise.velocity_random_walk_m_s;
-  const double rest_s = setup.start.at_rest_s;
-  const double bias_m_s2 = velocity_walk / std::sqrt(rest_s);
-  const double lean_m_s3 = setup.gravity_m_s2 * setup.imu.noise.angle_random_walk_rad;
-  double held_m = setup.start.sigma_position_m;
-  for (std::size_t i = 0; i < line.points.size(); ++i) {
-    RailPoint& point = line.points[i];
-    const double span_s = recording.imu[i].interval_s;
-    if (rows[i].rests) {
-      held_m = i > 0 ? line.points[i - 1].sigma_world_m.maxCoeff() : held_m;
-      open_s = 0.0;
-    } else {
-      const Eigen::Vector3d before = i > 0 ? rows[i - 1].velocity_m_s : Eigen::Vector3d::Zero();
-      const Eigen::Vector3d step_m = 0.5 * span_s * (before + rows[i].velocity_m_s);
-      position_m += step_m;
-      distance_m += step_m.norm();
-      open_s += span_s;
-    }
-    point.position_world_m = position_m;
-    point.distance_m = distance_m;
-    const double noise_m = velocity_walk * std::sqrt(open_s * open_s * open_s / 3.0);
-    const double drift_m = 0.5 * bias_m_s2 * open_s * open_s;
-    const double lean_m = lean_m_s3 * std::sqrt(std::pow(open_s, 5) / 20.0);
-    const double turn_m = lean_m_s3 / std::sqrt(rest_s) * std::pow(open_s, 3) / 6.0;
-    point.sigma_world_m.setConstant(
-        std::hypot(std::hypot(held_m, noise_m), std::hypot(drift_m, lean_m, turn_m)));
-    point.status = rows[i].rests ? RailStatus::kFixed : RailStatus::kOpen;
-  }
-  return line;
+  if (const auto too_fast = FindTurnsTooFast(setup, recording, *rest)) return Failure{*too_fast};
+  Integration integration(
+      setup, *rest, *attitude, FindQuietSpans(setup, recording, *rest), recording.imu.front());
+  for (const ImuSample& sample : recording.imu) integration.Feed(sample);
+  return integration.Finish();
 }
 
 }  // namespace tbm

@@ -275,6 +275,7 @@ Result<RailLine, RailStartFailure> SolveRailLine(const RailSetup& setup,
   if (!rest) return Failure{rest.error()};
   const auto attitude = FindStartAttitude(setup, recording, *rest);
   if (!attitude) return Failure{attitude.error()};
+  if (const auto too_fast = FindTurnsTooFast(setup, recording, *rest)) return Failure{*too_fast};
   const std::vector<RestSpan> rests = FindQuietSpans(setup, recording, *rest);
 
   std::vector<SurveyedTarget> targets = recording.targets;
@@ -287,7 +288,7 @@ Result<RailLine, RailStartFailure> SolveRailLine(const RailSetup& setup,
   }
   RailLine line;
   line.target_modes = static_cast<std::size_t>(modes.count);
-  line.target_modes_left_out_m = modes.left_out_m;
+  line.target_modes_left_out_m = modes.left_out_m.maxCoeff();
   const RailPrior prior = MakeRailPrior(setup, *attitude, modes.count);
   Run run(setup, recording, targets, rests, prior);
   line.consistency = run.filter().consistency();
@@ -309,9 +310,7 @@ Result<RailLine, RailStartFailure> SolveRailLine(const RailSetup& setup,
   // What the states do not hold of the survey's errors is the same all along the line.
   for (RailPoint& point : line.points) {
     point.sigma_world_m =
-        (point.sigma_world_m.cwiseAbs2().array() + modes.left_out_m * modes.left_out_m)
-            .sqrt()
-            .matrix();
+        (point.sigma_world_m.cwiseAbs2() + modes.left_out_m.cwiseAbs2()).cwiseSqrt();
   }
   FillDistance(knots, &line.points);
   FillStatus(run.filter().fixes(), run.filter().gaps(), method, &line.points);

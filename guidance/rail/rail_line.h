@@ -52,7 +52,7 @@ struct RailLine {
   std::array<RailConsistency, kFusionUpdates> consistency;
   std::vector<RailRejection> rejections;
   std::size_t target_modes = 0;
-  double target_modes_left_out_m = 0.0;
+  double target_modes_left_out_m = 0.0;  // of the coordinate that it moves most
   std::vector<std::string> remarks;
 };
 

@@ -23,6 +23,11 @@ constexpr double kAstray = 0.02;
 constexpr double kNear_m = 1.0;
 // A gyro's bias over its sigma.
 constexpr double kMostBias = 8.0;
+// Noise over that of the data sheet, or under it: a unit may be worse or better, but not so much.
+constexpr double kOtherUnit = 20.0;
+constexpr double kMostTurns = 10.0;
+constexpr double kSure = 4.0;
+const double kTiltMounting_rad = DegToRad(0.05);
 
 Failure<RailStartFailure> Fail(const RailStartFailure& failure) { return {failure}; }
 
@@ -58,6 +63,21 @@ double MeanOff(const RailSetup& setup,
   return count > 0.0 ? sum / count : cap_px;
 }
 
+// The inclinometer's mean over the rest, in the unit's axes; empty where there is none.
+std::optional<Eigen::Vector3d> UpByTilt(const RailSetup& setup, const RailRecording& recording) {
+  if (!setup.tilt || recording.tilts.empty()) return {};
+  const Timestamp begin = BeginOf(recording.imu.front());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const TrolleyTilt& tilt : recording.tilts) {
+    if (SecondsBetween(begin, tilt.sensed_at) > setup.start.at_rest_s) break;
+    const double x = -std::sin(tilt.angles.beta_rad);
+    const double y = std::sin(tilt.angles.gamma_rad);
+    sum += Eigen::Vector3d(x, y, std::sqrt(std::max(0.0, 1.0 - x * x - y * y)));
+  }
+  if (sum.norm() <= 0.5) return {};
+  return setup.tilt->housing_from_imu.conjugate() * sum.normalized();
+}
+
 }  // namespace
 
 Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup,
@@ -87,7 +107,8 @@ Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup
   }
   const double expected = setup.imu.noise.angle_random_walk_rad * std::sqrt(setup.imu.rate_hz);
   const double gravity = first.accel.norm();
-  const bool is_wrong_rate = first.gyro_sigma.minCoeff() > 20.0 * expected;
+  const bool is_too_large = first.gyro_sigma.minCoeff() > kOtherUnit * expected;
+  const bool is_too_small = first.gyro_sigma.maxCoeff() < expected / kOtherUnit;
   const bool is_wrong_force = std::abs(gravity / setup.gravity_m_s2 - 1.0) > 0.1;
   RestSignature signature{first.gyro, first.accel, first.gyro_sigma, first.accel_sigma};
   const std::size_t window = QuietWindowSamples(setup);
@@ -101,9 +122,9 @@ Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup
     return Fail(
         {.fault = RailStartFault::kMovesAtStart, .at_s = SecondsBetween(begin, imu[at].ends_at)});
   }
-  if (is_wrong_rate) {
-    return Fail(
-        {.fault = RailStartFault::kWrongRateUnit, .times = first.gyro_sigma.minCoeff() / expected});
+  if (is_too_large || is_too_small) {
+    const double shown = is_too_large ? first.gyro_sigma.minCoeff() : first.gyro_sigma.maxCoeff();
+    return Fail({.fault = RailStartFault::kWrongRateUnit, .times = shown / expected});
   }
   if (is_wrong_force) {
     return Fail({.fault = RailStartFault::kWrongForce, .times = gravity / setup.gravity_m_s2});
@@ -123,16 +144,16 @@ Result<Eigen::Quaterniond, RailStartFailure> FindStartAttitude(const RailSetup& 
                                                                const RailRecording& recording,
                                                                const RestSignature& rest) {
   Eigen::Vector3d up_in_imu = rest.mean_accel_m_s2.normalized();
-  if (setup.tilt && !recording.tilts.empty()) {
-    const Timestamp begin = BeginOf(recording.imu.front());
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (const TrolleyTilt& tilt : recording.tilts) {
-      if (SecondsBetween(begin, tilt.sensed_at) > setup.start.at_rest_s) break;
-      const double x = -std::sin(tilt.angles.beta_rad);
-      const double y = std::sin(tilt.angles.gamma_rad);
-      sum += Eigen::Vector3d(x, y, std::sqrt(std::max(0.0, 1.0 - x * x - y * y)));
+  if (const auto by_tilt = UpByTilt(setup, recording)) {
+    const double off_rad = std::atan2(up_in_imu.cross(*by_tilt).norm(), up_in_imu.dot(*by_tilt));
+    const double most_rad = kSure * std::hypot(setup.imu.accel_bias_sigma_m_s2 / setup.gravity_m_s2,
+                                               setup.tilt->sigma_rad,
+                                               kTiltMounting_rad);
+    if (off_rad > most_rad) {
+      return Fail(
+          {.fault = RailStartFault::kTiltDisagrees, .off_rad = off_rad, .most_rad = most_rad});
     }
-    if (sum.norm() > 0.5) up_in_imu = setup.tilt->housing_from_imu.conjugate() * sum.normalized();
+    up_in_imu = *by_tilt;
   }
   const Eigen::Quaterniond level = TurnBetween(up_in_imu, Eigen::Vector3d::UnitZ());
   const auto headed = [&](double turn_rad) { return ExpRotation({0.0, 0.0, turn_rad}) * level; };
@@ -175,6 +196,32 @@ Result<Eigen::Quaterniond, RailStartFailure> FindStartAttitude(const RailSetup& 
     return Fail({.fault = RailStartFault::kNoTargetFits, .off_px = least});
   }
   return headed(best_rad);
+}
+
+std::optional<RailStartFailure> FindTurnsTooFast(const RailSetup& setup,
+                                                 const RailRecording& recording,
+                                                 const RestSignature& rest) {
+  const auto window = static_cast<std::size_t>(setup.imu.rate_hz);
+  const double window_s = static_cast<double>(window) / setup.imu.rate_hz;
+  double turned = 0.0;  // sums of squares [rad2]
+  double felt = 0.0;
+  double seconds = 0.0;
+  std::optional<QuietMean> before;
+  for (std::size_t at = 0; at + window <= recording.imu.size(); at += window) {
+    const QuietMean mean = MeanOf(recording.imu, at, at + window);
+    if (before) {
+      const Eigen::Vector3d up = (before->accel + mean.accel).normalized();
+      const Eigen::Vector3d rate = 0.5 * (before->gyro + mean.gyro) - rest.mean_gyro_rad_s;
+      turned += (window_s * up.cross(rate)).squaredNorm();
+      felt += (mean.accel.normalized() - before->accel.normalized()).squaredNorm();
+      seconds += window_s;
+    }
+    before = mean;
+  }
+  const double noise = kOtherUnit * setup.imu.noise.angle_random_walk_rad;
+  if (turned <= noise * noise * seconds || turned <= kMostTurns * kMostTurns * felt) return {};
+  return RailStartFailure{.fault = RailStartFault::kTurnsTooFast,
+                          .times = std::sqrt(turned / felt)};
 }
 
 std::vector<RestSpan> FindQuietSpans(const RailSetup& setup,

@@ -1,7 +1,11 @@
 #include "guidance/rail/rail_tracker.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
+
+#include "guidance/fusion/target_modes.h"
 
 namespace tbm {
 namespace {
@@ -91,7 +95,8 @@ void RailTracker::Start() {
   quiet_.emplace(setup_, *rest);
   for (const ImuSample& sample : samples_) quiet_->Feed(sample);
   // What is wrong with the survey takes a whole run to be seen: the line that is smoothed in the
-  // end has it in its state, this one takes the targets as they stand.
+  // end has it in its state. This one takes the targets as they stand, image after image: its own
+  // covariance knows nothing of an error that all images share, so WeighSurvey adds it.
   filter_.emplace(setup_,
                   targets_,
                   quiet_->spans(),
@@ -110,12 +115,33 @@ void RailTracker::Step() {
 }
 
 void RailTracker::Follow(const ImuSample& sample) {
+  const auto newest = images_.upper_bound(sample.ends_at);
+  if (newest != images_.begin()) newest_image_ = std::prev(newest)->second;
   Pass(sample.ends_at, &tilts_);
   Pass(sample.ends_at, &images_);
   Pass(sample.ends_at, &wheels_);
   filter_->Feed(sample);
   rejections_ += filter_->TakeRejections().size();
   if (filter_->last_epoch() != last_epoch_) AddDistance();
+  WeighSurvey();
+}
+
+// Of the last image that was taken; it stays when none come, as the place does.
+void RailTracker::WeighSurvey() {
+  const RailConsistency& seen =
+      filter_->consistency()[static_cast<std::size_t>(FusionUpdate::kTargets)];
+  if (!newest_image_ || seen.last_accepted_at != newest_image_->stamped_at) return;
+  const FusionState& state = filter_->filter().state();
+  const Rigid3 world_from_imu{state.motion.world_from_imu, state.motion.position_world_m};
+  const Rigid3 camera_from_imu{state.camera_from_imu,
+                               state.camera_from_imu * -state.camera_in_imu_m};
+  TargetView view{camera_from_imu * Inverse(world_from_imu), {}};
+  for (const TargetPixel& pixel : newest_image_->pixels) view.targets.push_back(pixel.target);
+  const double level_rad =
+      setup_.tilt ? setup_.tilt->sigma_rad : setup_.imu.accel_bias_sigma_m_s2 / setup_.gravity_m_s2;
+  survey_sigma_m_ = SurveySigma(
+      view, setup_.camera->model, setup_.camera->residual_px, std::max(level_rad, 1e-6), targets_);
+  newest_image_.reset();
 }
 
 // As along a finished line: between epochs, and not at all where the trolley stands.
@@ -154,7 +180,9 @@ std::optional<TrolleyPlace> RailTracker::Place() const {
   place.at = ahead.now();
   place.motion = ahead.state().motion;
   const FusionVector sigma = ahead.covariance().diagonal().cwiseSqrt();
-  place.sigma_position_m = sigma.segment<3>(FusionLayout::kPosition);
+  place.sigma_position_m =
+      (sigma.segment<3>(FusionLayout::kPosition).cwiseAbs2() + survey_sigma_m_.cwiseAbs2())
+          .cwiseSqrt();
   place.sigma_velocity_m_s = sigma.segment<3>(FusionLayout::kVelocity);
   place.sigma_attitude_rad = sigma.segment<3>(FusionLayout::kAttitude);
   place.gyro_bias_rad_s = ahead.state().gyro_bias_rad_s;

@@ -38,6 +38,7 @@ struct TrolleyPlace {
   Timestamp at;
   TrolleyHold hold = TrolleyHold::kOpen;
   Motion motion;
+  // With what the survey of the targets seen last may be wrong; velocity and attitude are without.
   Eigen::Vector3d sigma_position_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d sigma_velocity_m_s = Eigen::Vector3d::Zero();
   Eigen::Vector3d sigma_attitude_rad = Eigen::Vector3d::Zero();  // axes of the unit
@@ -91,6 +92,7 @@ class RailTracker {
   void Step();
   void Follow(const ImuSample& sample);
   void AddDistance();
+  void WeighSurvey();
   TrolleyHold HoldAt(Timestamp at) const;
 
   const RailSetup setup_;
@@ -113,6 +115,8 @@ class RailTracker {
   std::optional<Timestamp> last_epoch_;
   Eigen::Vector3d at_last_epoch_m_ = Eigen::Vector3d::Zero();
   double distance_m_ = 0.0;
+  std::optional<TargetImage> newest_image_;  // that the filter was given
+  Eigen::Vector3d survey_sigma_m_ = Eigen::Vector3d::Zero();
   std::uint64_t came_too_late_ = 0;
   std::uint64_t rejections_ = 0;
 };
