@@ -1,5 +1,6 @@
 #include "guidance/app/targets_command.h"
 
+#include <algorithm>
 #include <iterator>
 #include <map>
 
@@ -38,18 +39,21 @@ struct Counts {
   std::size_t outside = 0;  // of the samples
   std::size_t seen = 0;
   std::map<std::string_view, std::size_t> refused;
-  // By target: how often seen, and why not.
+  // By target that has a mark: how often seen, how often outside of the image, and why not seen.
   std::map<std::size_t, std::map<std::string_view, std::size_t>> of_target;
 };
 
-Counts CountsOf(const std::vector<FrameOutcome>& frames) {
+Counts CountsOf(const RailRun& run, const std::vector<FrameOutcome>& frames) {
   Counts counts;
   counts.frames = frames.size();
+  std::size_t looked_at = 0;
   for (const FrameOutcome& frame : frames) {
     if (!frame.is_in_run) {
       ++counts.outside;
     } else if (!frame.is_readable) {
       ++counts.unreadable;
+    } else {
+      ++looked_at;
     }
     counts.seen += frame.targets.seen.size();
     for (const TargetSeen& one : frame.targets.seen) ++counts.of_target[one.target]["seen"];
@@ -57,6 +61,14 @@ Counts CountsOf(const std::vector<FrameOutcome>& frames) {
       ++counts.refused[Word(one.why)];
       ++counts.of_target[one.target][Word(one.why)];
     }
+  }
+  for (std::size_t target = 0; target < run.marks.size(); ++target) {
+    if (!run.marks[target]) continue;
+    auto& words = counts.of_target[target];
+    std::size_t told = 0;
+    for (const auto& [word, times] : words) told += times;
+    words["seen"] += 0;
+    if (told < looked_at) words["outside"] = looked_at - told;
   }
   return counts;
 }
@@ -96,9 +108,11 @@ std::optional<std::string> Missing(const RailRun& run) {
   if (run.frames.empty()) {
     return "frames.csv: has no images; it needs the columns stamp_ns and file";
   }
-  if (run.marks.empty()) {
-    return "targets.csv: has no column kind, which says what each target looks like: led, "
-           "circle:DIAMETER_MM, coded:NUMBER or board:NAME:COLUMNSxROWS:POINT";
+  const bool is_any = std::any_of(
+      run.marks.begin(), run.marks.end(), [](const auto& mark) { return mark.has_value(); });
+  if (!is_any) {
+    return "targets.csv: has no column kind, or nothing in it; it says what each target looks "
+           "like: led, circle:DIAMETER_MM, coded:NUMBER or board:NAME:COLUMNSxROWS:POINT";
   }
   return std::nullopt;
 }
@@ -136,7 +150,7 @@ ExitCode RunTargets(const TargetsRequest& request, const Console& console) {
     Complain(console, request.run + "/" + Explain(frames.error(), run->setup));
     return ExitCode::kBadInput;
   }
-  const Counts counts = CountsOf(*frames);
+  const Counts counts = CountsOf(*run, *frames);
   if (const auto fault = files.Write(Table(*run, *frames), Report(*run, counts).dump(2) + "\n")) {
     Complain(console, *fault);
     return ExitCode::kBadInput;

@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pose/calibrate/find_board.h"
+#include "pose/centres/image_view.h"
 
 namespace tbm {
 namespace {
@@ -28,49 +29,98 @@ Board FormOf(const SoughtBoard& board) {
   return form;
 }
 
-// Part of the image that surely holds the board if it is there at all.
-struct Window {
-  int left = 0;
-  int top = 0;
-  int right = 0;  // one beyond
-  int bottom = 0;
-};
-Window WholeOf(const ImageView& image) { return {0, 0, image.width_px, image.height_px}; }
+ImageView ViewOf(const cv::Mat& grey) {
+  ImageView view;
+  view.pixels = grey.data;
+  view.width_px = grey.cols;
+  view.height_px = grey.rows;
+  view.stride_bytes = static_cast<int>(grey.step);
+  return view;
+}
 
-std::optional<Window> WindowOf(const ImageView& image,
-                               const SoughtBoard& board,
-                               const TargetGates& gates) {
-  Eigen::Vector2d least(1e9, 1e9);
-  Eigen::Vector2d most(-1e9, -1e9);
-  double gate_px = 0.0;
+// Place of a point on the board, in pitches.
+Eigen::Vector2d OnBoard(const SoughtBoard& board, int point) {
+  return {point % board.columns, point / board.columns};
+}
+
+// By the two surveyed points that are furthest from each other, or nearly so; 0 where there is but
+// one.
+double Pitch_m(std::span<const SoughtTarget> targets, const SoughtBoard& board) {
+  const SoughtTarget& first = targets[board.targets.front()];
+  double furthest = 0.0;
+  double pitch_m = 0.0;
+  for (const std::size_t target : board.targets) {
+    const SoughtTarget& other = targets[target];
+    const double pitches =
+        (OnBoard(board, other.mark.point) - OnBoard(board, first.mark.point)).norm();
+    if (pitches <= furthest) continue;
+    furthest = pitches;
+    pitch_m = (other.in_world_m - first.in_world_m).norm() / pitches;
+  }
+  return pitch_m;
+}
+
+// From a point to the end of the board's light rim, at most.
+double Reach(const SoughtBoard& board, int point) {
+  constexpr double kSquareAndRim = 2.0;
+  const Eigen::Vector2d at = OnBoard(board, point);
+  const Eigen::Vector2d last(board.columns - 1, board.rows - 1);
+  return (at.cwiseMax(last - at) + Eigen::Vector2d::Constant(kSquareAndRim)).norm();
+}
+
+// Part of the image that surely holds the board if it is there at all: as far around each surveyed
+// point as the board reaches, however it is turned.
+std::optional<cv::Rect> WindowOf(const cv::Mat& grey,
+                                 const CameraModel& camera,
+                                 std::span<const SoughtTarget> targets,
+                                 const SoughtBoard& board,
+                                 const TargetGates& gates) {
+  constexpr int kLeastSide_px = 16;
+  const double pitch_m = Pitch_m(targets, board);
+  Eigen::Array2d least(0.0, 0.0);
+  Eigen::Array2d most(grey.cols, grey.rows);
   for (const std::size_t target : board.targets) {
     if (!gates.Expects(target)) return {};
     const auto gate = gates.At(target, 1.0);
-    least = least.cwiseMin(gate.pixel_px);
-    most = most.cwiseMax(gate.pixel_px);
-    gate_px = std::max(gate_px, gate.HalfWidth_px());
+    const double reach_m = pitch_m * Reach(board, targets[target].mark.point);
+    // What comes nearer to the camera than the point is looks larger.
+    const double nearest_m = camera.fx_px / gates.Expected(target).px_per_m - reach_m;
+    if (!(reach_m > 0.0) || nearest_m < reach_m) continue;
+    const double reach_px = camera.fx_px * reach_m / nearest_m + gate.HalfWidth_px();
+    least = least.max(gate.pixel_px.array() - reach_px);
+    most = most.min(gate.pixel_px.array() + reach_px);
   }
-  // Its outer squares and the rim around them belong to what the finder looks for.
-  const double rim_px =
-      gate_px + 2.0 * (most - least).maxCoeff() / (std::min(board.columns, board.rows) - 1);
-  const auto clip = [](double at_px, int size_px) {
-    return static_cast<int>(std::clamp(at_px, 0.0, static_cast<double>(size_px)));
-  };
-  const Window window{clip(least.x() - rim_px, image.width_px),
-                      clip(least.y() - rim_px, image.height_px),
-                      clip(most.x() + rim_px, image.width_px),
-                      clip(most.y() + rim_px, image.height_px)};
-  if (window.right - window.left < 16 || window.bottom - window.top < 16) return {};
-  return window;
+  if (!((most - least).minCoeff() >= kLeastSide_px)) return {};
+  const Eigen::Array2i from = least.cast<int>();
+  const Eigen::Array2i size = most.cast<int>() - from;
+  return cv::Rect(from.x(), from.y(), size.x(), size.y());
 }
 
-ImageView Part(const ImageView& image, const Window& window) {
-  ImageView part = image;
-  part.pixels = static_cast<const std::uint8_t*>(image.pixels) + window.top * image.stride_bytes +
-                window.left * image.bytes_per_pixel;
-  part.width_px = window.right - window.left;
-  part.height_px = window.bottom - window.top;
-  return part;
+// So that it is not found again. Not where it reaches the horizon of its plane: then it is found
+// again, and is ambiguous.
+void PaintOver(const SoughtBoard& board, const Pixels& pixels, cv::Mat* grey) {
+  constexpr double kBeyond = 1.3;  // pitches: its outer squares
+  std::vector<cv::Point2d> plane;
+  std::vector<cv::Point2d> seen;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const Eigen::Vector2d at = OnBoard(board, static_cast<int>(i));
+    plane.emplace_back(at.x(), at.y());
+    seen.emplace_back(pixels[i].x(), pixels[i].y());
+  }
+  const cv::Mat image_from_plane = cv::findHomography(plane, seen);
+  if (image_from_plane.empty()) return;
+  const double right = board.columns - 1 + kBeyond;
+  const double bottom = board.rows - 1 + kBeyond;
+  const std::vector<cv::Point2d> corners = {
+      {-kBeyond, -kBeyond}, {right, -kBeyond}, {right, bottom}, {-kBeyond, bottom}};
+  std::vector<cv::Point2d> around;
+  cv::perspectiveTransform(corners, around, image_from_plane);
+  std::vector<cv::Point> outline;
+  for (const cv::Point2d& p : around) {
+    if (!(std::abs(p.x) < 1e4 && std::abs(p.y) < 1e4)) return;
+    outline.emplace_back(cvRound(p.x), cvRound(p.y));
+  }
+  cv::fillConvexPoly(*grey, outline, cv::mean(*grey));
 }
 
 // How well the points lie on a plane, without the lens: rms of one coordinate.
@@ -80,8 +130,8 @@ double Scatter(const CameraModel& camera, const SoughtBoard& board, const Pixels
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const auto ideal = NormalisedFromPixel(camera, pixels[i]);
     if (!ideal) return std::numeric_limits<double>::infinity();
-    const auto columns = static_cast<std::size_t>(board.columns);
-    plane.emplace_back(static_cast<double>(i % columns), static_cast<double>(i / columns));
+    const Eigen::Vector2d at = OnBoard(board, static_cast<int>(i));
+    plane.emplace_back(at.x(), at.y());
     seen.emplace_back(camera.fx_px * ideal->x(), camera.fy_px * ideal->y());
   }
   const cv::Mat seen_from_plane = cv::findHomography(plane, seen);
@@ -108,13 +158,19 @@ bool Fits(std::span<const SoughtTarget> targets,
   });
 }
 
-// How surely the points rise in the image as they do in the world: 1 yes, -1 the other way round.
+// How surely the points rise in the image as they do in the world: 1 yes, -1 the other way round; 0
+// where they hardly rise, and the survey's own errors would decide.
 double RisesAsSurveyed(const CameraModel& camera,
                        std::span<const SoughtTarget> targets,
                        const SoughtBoard& board,
                        const Pixels& pixels,
                        const Eigen::Vector3d& up_in_camera) {
+  constexpr double kLeastPitches = 0.5;
+  constexpr double kLeastSigmas = 6.0;
   std::vector<std::pair<double, double>> rises;
+  double least_m = kLeastPitches * Pitch_m(targets, board);
+  double lowest_m = std::numeric_limits<double>::infinity();
+  double highest_m = -lowest_m;
   double mean_z = 0.0;
   double mean_seen = 0.0;
   for (const std::size_t target : board.targets) {
@@ -123,9 +179,13 @@ double RisesAsSurveyed(const CameraModel& camera,
     if (!ideal) return 0.0;
     const Eigen::Vector2d up = up_in_camera.head<2>() - *ideal * up_in_camera.z();
     rises.emplace_back(targets[target].in_world_m.z(), ideal->dot(up.normalized()));
+    least_m = std::max(least_m, kLeastSigmas * targets[target].sigma_m);
+    lowest_m = std::min(lowest_m, rises.back().first);
+    highest_m = std::max(highest_m, rises.back().first);
     mean_z += rises.back().first / static_cast<double>(board.targets.size());
     mean_seen += rises.back().second / static_cast<double>(board.targets.size());
   }
+  if (!(highest_m - lowest_m >= least_m)) return 0.0;
   double both = 0.0;
   double z2 = 0.0;
   double seen2 = 0.0;
@@ -165,11 +225,151 @@ bool IsCorner(const cv::Mat& grey, const Eigen::Vector2d& at_px, double radius_p
   return changes == 4 && as_opposite >= kPlaces - 6;
 }
 
-// Points of a board that is not seen whole: each in its own gate.
-std::vector<TargetSeen> SinglePoints(const cv::Mat& grey,
-                                     const SoughtBoard& board,
-                                     std::span<const SoughtTarget> targets,
-                                     const TargetGates& gates) {
+// Two boards' points are two squares apart or more: where gates are narrower there is but one.
+bool MayBeTwo(const SoughtBoard& board, const TargetGates& gates, const Pixels& pixels) {
+  const auto columns = static_cast<std::size_t>(board.columns);
+  double pitch_px = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if ((i + 1) % columns != 0) pitch_px = std::min(pitch_px, (pixels[i + 1] - pixels[i]).norm());
+    if (i + columns < pixels.size()) {
+      pitch_px = std::min(pitch_px, (pixels[i + columns] - pixels[i]).norm());
+    }
+  }
+  return std::any_of(board.targets.begin(), board.targets.end(), [&](std::size_t target) {
+    return gates.At(target, 0.0).HalfWidth_px() > 0.5 * pitch_px;
+  });
+}
+
+// Whether there is one more. FindBoard's last resort takes minutes where a board of another form is
+// in view, and is for the board that is sought.
+bool HasAnother(const cv::Mat& grey, const SoughtBoard& board) {
+  std::vector<cv::Point2f> corners;
+  const cv::Size size(board.columns, board.rows);
+  constexpr int kThorough =
+      cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE | cv::CALIB_CB_ACCURACY;
+  try {
+    return cv::findChessboardCornersSB(grey, size, corners, cv::CALIB_CB_NORMALIZE_IMAGE) ||
+           cv::findChessboardCornersSB(grey, size, corners, kThorough);
+  } catch (const cv::Exception&) {
+    // Its own geometry degenerates on what it took for a board.
+    return false;
+  }
+}
+
+// Which of the points is which, of a board that lies there.
+BoardOutcome Counted(const CameraModel& camera,
+                     std::span<const SoughtTarget> targets,
+                     const SoughtBoard& board,
+                     const TargetGates* gates,
+                     const std::optional<Eigen::Vector3d>& up_in_camera,
+                     Pixels pixels) {
+  BoardOutcome outcome;
+  const double sigma_px = std::hypot(Scatter(camera, board, pixels), kFloor_px);
+  if (!std::isfinite(sigma_px)) return outcome;
+  const Pixels turned(pixels.rbegin(), pixels.rend());
+  const bool may_be_turned = LooksTheSameTurned(FormOf(board));
+  bool is_as_found = true;
+  if (gates != nullptr) {
+    is_as_found = Fits(targets, board, *gates, pixels, sigma_px);
+    const bool is_turned = may_be_turned && Fits(targets, board, *gates, turned, sigma_px);
+    if (is_as_found == is_turned) {
+      outcome.why = is_as_found ? TargetRefusal::kAmbiguous : TargetRefusal::kTooFar;
+      if (is_as_found) outcome.corners_px = std::move(pixels);
+      return outcome;
+    }
+  } else if (may_be_turned) {
+    constexpr double kSure = 0.7;
+    const double rises =
+        up_in_camera ? RisesAsSurveyed(camera, targets, board, pixels, *up_in_camera) : 0.0;
+    if (std::abs(rises) < kSure) {
+      outcome.why = TargetRefusal::kAmbiguous;
+      outcome.corners_px = std::move(pixels);
+      return outcome;
+    }
+    is_as_found = rises > 0.0;
+  }
+  outcome.corners_px = is_as_found ? std::move(pixels) : turned;
+  for (const std::size_t target : board.targets) {
+    const auto point = static_cast<std::size_t>(targets[target].mark.point);
+    outcome.seen.push_back({target, outcome.corners_px[point], sigma_px});
+  }
+  return outcome;
+}
+
+}  // namespace
+
+std::vector<SoughtBoard> BoardsAmong(std::span<const SoughtTarget> targets) {
+  std::vector<SoughtBoard> boards;
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    const TargetMark& mark = targets[i].mark;
+    if (mark.kind != TargetKind::kBoard) continue;
+    auto known = std::find_if(boards.begin(), boards.end(), [&](const SoughtBoard& board) {
+      return board.name == mark.board && board.columns == mark.columns && board.rows == mark.rows;
+    });
+    if (known == boards.end()) {
+      known = boards.insert(boards.end(), {mark.board, mark.columns, mark.rows, {}});
+    }
+    known->targets.push_back(i);
+  }
+  return boards;
+}
+
+bool IsSameForm(const SoughtBoard& a, const SoughtBoard& b) {
+  return std::minmax(a.columns, a.rows) == std::minmax(b.columns, b.rows);
+}
+
+bool HaveTheSame(const BoardOutcome& a, const BoardOutcome& b) {
+  constexpr double kSame_px = 2.0;
+  return std::any_of(a.corners_px.begin(), a.corners_px.end(), [&](const Eigen::Vector2d& p) {
+    return std::any_of(b.corners_px.begin(), b.corners_px.end(), [&](const Eigen::Vector2d& q) {
+      return (p - q).norm() < kSame_px;
+    });
+  });
+}
+
+BoardOutcome FindWholeBoard(const cv::Mat& grey,
+                            const CameraModel& camera,
+                            std::span<const SoughtTarget> targets,
+                            const SoughtBoard& board,
+                            const TargetGates* gates,
+                            const std::optional<Eigen::Vector3d>& up_in_camera) {
+  constexpr int kMostLooks = 8;
+  BoardOutcome outcome;
+  const auto window = gates != nullptr ? WindowOf(grey, camera, targets, board, *gates)
+                                       : cv::Rect(0, 0, grey.cols, grey.rows);
+  if (!window) return outcome;
+  cv::Mat part = grey(*window).clone();
+  for (int look = 0; look < kMostLooks; ++look) {
+    if (look > 0 && !HasAnother(part, board)) return outcome;
+    auto found = FindBoard(ViewOf(part), FormOf(board));
+    if (!found) {
+      const bool is_too_small = look == 0 && found.error() == FindBoardFailure::kTooSmall;
+      if (is_too_small) outcome.why = TargetRefusal::kTooSmall;
+      return outcome;
+    }
+    Pixels pixels = std::move(found).value();
+    PaintOver(board, pixels, &part);
+    for (Eigen::Vector2d& p : pixels) p += Eigen::Vector2d(window->x, window->y);
+    BoardOutcome one = Counted(camera, targets, board, gates, up_in_camera, std::move(pixels));
+    if (outcome.corners_px.empty()) {
+      outcome = std::move(one);
+    } else if (!one.corners_px.empty()) {
+      outcome.seen.clear();
+      outcome.why = TargetRefusal::kAmbiguous;
+      outcome.corners_px.insert(
+          outcome.corners_px.end(), one.corners_px.begin(), one.corners_px.end());
+    }
+    const bool is_alone = gates != nullptr && !outcome.corners_px.empty() &&
+                          !MayBeTwo(board, *gates, outcome.corners_px);
+    if (is_alone) return outcome;
+  }
+  return outcome;
+}
+
+std::vector<TargetSeen> FindBoardPoints(const cv::Mat& grey,
+                                        std::span<const SoughtTarget> targets,
+                                        const SoughtBoard& board,
+                                        const TargetGates& gates) {
   constexpr double kWidestGate = 0.33;  // of the pitch
   constexpr double kSigma_px = 0.1;     // worse than of whole boards: what hides it casts shadows
   double pitch_px = std::numeric_limits<double>::infinity();
@@ -210,71 +410,6 @@ std::vector<TargetSeen> SinglePoints(const cv::Mat& grey,
     seen.push_back({target, pixel_px, kSigma_px});
   }
   return seen;
-}
-
-}  // namespace
-
-std::vector<SoughtBoard> BoardsAmong(std::span<const SoughtTarget> targets) {
-  std::vector<SoughtBoard> boards;
-  for (std::size_t i = 0; i < targets.size(); ++i) {
-    const TargetMark& mark = targets[i].mark;
-    if (mark.kind != TargetKind::kBoard) continue;
-    auto known = std::find_if(boards.begin(), boards.end(), [&](const SoughtBoard& board) {
-      return board.name == mark.board && board.columns == mark.columns && board.rows == mark.rows;
-    });
-    if (known == boards.end()) {
-      known = boards.insert(boards.end(), {mark.board, mark.columns, mark.rows, {}});
-    }
-    known->targets.push_back(i);
-  }
-  return boards;
-}
-
-BoardOutcome FindBoardPoints(const ImageView& image,
-                             const cv::Mat& grey,
-                             const CameraModel& camera,
-                             std::span<const SoughtTarget> targets,
-                             const SoughtBoard& board,
-                             const TargetGates* gates,
-                             const std::optional<Eigen::Vector3d>& up_in_camera) {
-  BoardOutcome outcome;
-  const Board form = FormOf(board);
-  const auto window = gates != nullptr ? WindowOf(image, board, *gates) : WholeOf(image);
-  if (!window) return outcome;
-  auto found = FindBoard(Part(image, *window), form);
-  if (!found) {
-    if (gates != nullptr) outcome.seen = SinglePoints(grey, board, targets, *gates);
-    if (found.error() == FindBoardFailure::kTooSmall) outcome.why = TargetRefusal::kTooSmall;
-    return outcome;
-  }
-  Pixels pixels = std::move(found).value();
-  for (Eigen::Vector2d& p : pixels) p += Eigen::Vector2d(window->left, window->top);
-  const double sigma_px = std::hypot(Scatter(camera, board, pixels), kFloor_px);
-  const Pixels turned(pixels.rbegin(), pixels.rend());
-  const bool may_be_turned = LooksTheSameTurned(form);
-  bool is_as_found = true;
-  if (gates != nullptr) {
-    is_as_found = Fits(targets, board, *gates, pixels, sigma_px);
-    const bool is_turned = may_be_turned && Fits(targets, board, *gates, turned, sigma_px);
-    if (is_as_found == is_turned) {
-      outcome.why = is_as_found ? TargetRefusal::kAmbiguous : TargetRefusal::kTooFar;
-      return outcome;
-    }
-  } else if (may_be_turned) {
-    constexpr double kSure = 0.7;
-    const double rises =
-        up_in_camera ? RisesAsSurveyed(camera, targets, board, pixels, *up_in_camera) : 0.0;
-    if (std::abs(rises) < kSure) {
-      outcome.why = TargetRefusal::kAmbiguous;
-      return outcome;
-    }
-    is_as_found = rises > 0.0;
-  }
-  for (const std::size_t target : board.targets) {
-    const auto point = static_cast<std::size_t>(targets[target].mark.point);
-    outcome.seen.push_back({target, (is_as_found ? pixels : turned)[point], sigma_px});
-  }
-  return outcome;
 }
 
 }  // namespace tbm

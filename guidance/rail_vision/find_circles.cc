@@ -123,8 +123,8 @@ std::optional<FoundMark> Measure(const cv::Mat& grey,
   FoundMark mark;
   mark.pixel_px = PixelFromNormalised(camera, 0.5 * (a + b));
   mark.diameter_px = 2.0 * ellipse_px.LongerRadius();
-  const double either_px = 0.5 * f_px * (a - b).norm();
-  const double sigma2 = 0.5 * fit->covariance.trace() + 0.5 * either_px * either_px;
+  mark.bias_px = 0.5 * f_px * (a - b).norm();
+  const double sigma2 = 0.5 * fit->covariance.trace() + 0.5 * mark.bias_px * mark.bias_px;
   mark.sigma_px = std::sqrt(sigma2 + kFloor_px * kFloor_px);
   return mark;
 }

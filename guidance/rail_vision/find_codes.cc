@@ -101,6 +101,16 @@ double MedianOf(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
+// The four by four cells turned by a quarter, as ReadCode counts them.
+unsigned Turned(unsigned cells) {
+  unsigned turned = 0;
+  for (int i = 0; i < 16; ++i) {
+    const int from = 4 * (i % 4) + 3 - i / 4;
+    turned = 2 * turned + (cells >> (15 - from) & 1u);
+  }
+  return turned;
+}
+
 // The code on a square: a light rim, a dark border, and cells of the dictionary, however turned.
 std::optional<int> ReadCode(const cv::Mat& grey, const Corners& corners_px) {
   constexpr double kLeastContrast_dn = 15.0;
@@ -122,20 +132,14 @@ std::optional<int> ReadCode(const cv::Mat& grey, const Corners& corners_px) {
   const auto light =
       std::count_if(border.begin(), border.end(), [&](double value) { return value > middle; });
   if (light > 2) return {};
+  unsigned cells = 0;
+  for (int i = 0; i < 16; ++i) cells = 2 * cells + (at(2 + i / 4, 2 + i % 4) > middle ? 1u : 0u);
+  // How it is turned nobody asks: the middle stays where it is.
   for (int turn = 0; turn < 4; ++turn) {
-    unsigned cells = 0;
-    for (int i = 0; i < 16; ++i) {
-      const int row = i / 4;
-      const int column = i % 4;
-      const bool is_light = turn == 0   ? at(2 + row, 2 + column) > middle
-                            : turn == 1 ? at(2 + column, 5 - row) > middle
-                            : turn == 2 ? at(5 - row, 5 - column) > middle
-                                        : at(5 - column, 2 + row) > middle;
-      cells = 2 * cells + (is_light ? 1u : 0u);
-    }
     for (std::size_t code = 0; code < kCodeCells.size(); ++code) {
       if (std::popcount(cells ^ kCodeCells[code]) <= kMostWrongCells) return static_cast<int>(code);
     }
+    cells = Turned(cells);
   }
   return {};
 }

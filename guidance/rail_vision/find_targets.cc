@@ -16,6 +16,39 @@ constexpr int kLeastSide_px = 32;
 // A lamp's centre is not better than this: it is no point, and the lens does not picture it so.
 constexpr double kLedFloor_px = 0.01;
 constexpr double kLedSize_px = 3.0;
+// What stays the same from image to image does not average out, as the filter takes it to do.
+constexpr double kMostBias_px = 0.05;
+
+// What was found under one name, and is right or wrong as one: a coded target, the points of a
+// board.
+using Found = std::vector<TargetSeen>;
+
+// The furthest of it.
+double Distance(const TargetGates& gates, const Found& found) {
+  double most = 0.0;
+  for (const TargetSeen& one : found) {
+    most = std::max(most, gates.At(one.target, one.sigma_px).Distance(one.pixel_px));
+  }
+  return most;
+}
+
+bool Fits(const TargetGates& gates, const Found& found) {
+  return std::all_of(found.begin(), found.end(), [&](const TargetSeen& one) {
+    return gates.At(one.target, one.sigma_px).Has(one.pixel_px);
+  });
+}
+
+// As a witness: where one of its points is wrong all are, so all weigh as much as one.
+void TakeAsOne(const Found& found, TargetGates* gates) {
+  const auto count = static_cast<double>(found.size());
+  for (const TargetSeen& one : found) {
+    // The survey's error the gates add once themselves.
+    const double survey_px = gates->Expected(one.target).survey_sigma_px;
+    const double of_image = count * one.sigma_px * one.sigma_px;
+    const double of_survey = (count - 1.0) * survey_px * survey_px;
+    gates->Take(one.target, one.pixel_px, std::sqrt(of_image + of_survey));
+  }
+}
 
 // One image, from what names itself to what only its place tells.
 class Search {
@@ -29,14 +62,15 @@ class Search {
         camera_(camera),
         targets_(targets),
         ahead_(ahead),
+        boards_(BoardsAmong(targets)),
         why_(targets.size(), TargetRefusal::kNotFound),
         seen_(targets.size()) {
     if (ahead.expected) gates_.emplace(*ahead.expected);
   }
 
   TargetsInImage Go(CentreFinder* centres) {
-    TakeCodes();
-    for (const SoughtBoard& board : BoardsAmong(targets_)) TakeBoard(board);
+    TakeNamed();
+    if (gates_) TakeRestOfBoards();
     TakeCircles();
     TakeLeds(centres);
     if (gates_) DropWhatDoesNotFit();
@@ -59,11 +93,19 @@ class Search {
     return of_kind;
   }
 
-  void TakeCodes() {
+  void TakeNamed() {
+    std::vector<Found> candidates = FindCoded();
+    for (Found& board : FindWholeBoards()) candidates.push_back(std::move(board));
+    for (const Found& found : Agreeing(candidates)) {
+      for (const TargetSeen& one : found) Take(one);
+    }
+  }
+
+  std::vector<Found> FindCoded() {
+    std::vector<Found> candidates;
     const auto coded = Of(TargetKind::kCoded);
-    if (coded.empty()) return;
+    if (coded.empty()) return candidates;
     const FoundCodes found = FindCodes(grey_, camera_);
-    std::vector<TargetSeen> candidates;
     for (const std::size_t target : coded) {
       const int code = targets_[target].mark.code;
       const auto has = [&](const std::vector<int>& codes) {
@@ -82,43 +124,76 @@ class Search {
         }
       }
       if (fitting.size() == 1) {
-        candidates.push_back({target, fitting[0]->pixel_px, fitting[0]->sigma_px});
+        candidates.push_back(Found{{target, fitting[0]->pixel_px, fitting[0]->sigma_px}});
       } else if (is_seen) {
         why_[target] = fitting.empty() ? TargetRefusal::kTooFar : TargetRefusal::kAmbiguous;
       }
     }
-    for (const TargetSeen& one : Agreeing(candidates)) Take(one);
+    return candidates;
+  }
+
+  // Those of one form name themselves only by where they are: without that they are not looked for,
+  // and what two took for theirs is nobody's.
+  std::vector<Found> FindWholeBoards() {
+    std::vector<BoardOutcome> outcomes;
+    for (const SoughtBoard& board : boards_) {
+      const auto is_like = [&](const SoughtBoard& other) { return IsSameForm(board, other); };
+      if (!gates_ && std::count_if(boards_.begin(), boards_.end(), is_like) > 1) {
+        outcomes.push_back({{}, {}, TargetRefusal::kAmbiguous});
+        continue;
+      }
+      outcomes.push_back(FindWholeBoard(
+          grey_, camera_, targets_, board, gates_ ? &*gates_ : nullptr, ahead_.up_in_camera));
+    }
+    std::vector<Found> candidates;
+    for (std::size_t i = 0; i < boards_.size(); ++i) {
+      bool is_shared = false;
+      for (std::size_t j = 0; j < boards_.size(); ++j) {
+        is_shared = is_shared || (i != j && HaveTheSame(outcomes[i], outcomes[j]));
+      }
+      for (const std::size_t target : boards_[i].targets) {
+        why_[target] = is_shared ? TargetRefusal::kAmbiguous : outcomes[i].why;
+      }
+      if (!is_shared && !outcomes[i].seen.empty()) candidates.push_back(outcomes[i].seen);
+    }
+    return candidates;
   }
 
   // Names may be exchanged, and wide gates do not show it: only a majority that agrees is believed.
-  std::vector<TargetSeen> Agreeing(const std::vector<TargetSeen>& candidates) {
+  std::vector<Found> Agreeing(const std::vector<Found>& candidates) {
     if (!gates_ || candidates.size() < 2) return candidates;
-    std::vector<TargetSeen> best;
-    for (const TargetSeen& first : candidates) {
+    std::vector<Found> best;
+    for (std::size_t first = 0; first < candidates.size(); ++first) {
       TargetGates gates = *gates_;
-      gates.Take(first.target, first.pixel_px, first.sigma_px);
-      std::vector<TargetSeen> agreeing;
-      for (const TargetSeen& other : candidates) {
-        const bool is_first = other.target == first.target;
-        if (!is_first && !gates.At(other.target, other.sigma_px).Has(other.pixel_px)) continue;
-        if (!is_first) gates.Take(other.target, other.pixel_px, other.sigma_px);
-        agreeing.push_back(other);
+      TakeAsOne(candidates[first], &gates);
+      std::vector<Found> agreeing = {candidates[first]};
+      for (std::size_t other = 0; other < candidates.size(); ++other) {
+        if (other == first || !Fits(gates, candidates[other])) continue;
+        TakeAsOne(candidates[other], &gates);
+        agreeing.push_back(candidates[other]);
       }
       if (agreeing.size() > best.size()) best = std::move(agreeing);
     }
     const bool is_majority = 2 * best.size() > candidates.size();
-    for (const TargetSeen& one : candidates) {
-      why_[one.target] = is_majority ? TargetRefusal::kTooFar : TargetRefusal::kAmbiguous;
+    for (const Found& found : candidates) {
+      for (const TargetSeen& one : found) {
+        why_[one.target] = is_majority ? TargetRefusal::kTooFar : TargetRefusal::kAmbiguous;
+      }
     }
     if (!is_majority) best.clear();
     return best;
   }
 
-  void TakeBoard(const SoughtBoard& board) {
-    const BoardOutcome outcome = FindBoardPoints(
-        image_, grey_, camera_, targets_, board, gates_ ? &*gates_ : nullptr, ahead_.up_in_camera);
-    for (const std::size_t target : board.targets) why_[target] = outcome.why;
-    for (const TargetSeen& one : outcome.seen) Take(one);
+  // Of boards that are partly hidden: the points have no names, but places.
+  void TakeRestOfBoards() {
+    for (const SoughtBoard& board : boards_) {
+      const bool is_left =
+          std::all_of(board.targets.begin(), board.targets.end(), [&](std::size_t target) {
+            return Expects(target) && !seen_[target] && why_[target] == TargetRefusal::kNotFound;
+          });
+      if (!is_left) continue;
+      for (const TargetSeen& one : FindBoardPoints(grey_, targets_, board, *gates_)) Take(one);
+    }
   }
 
   void TakeCircles() {
@@ -148,7 +223,7 @@ class Search {
         FindCircles(grey_, camera_, std::max(least_px, 0.8 * kLeastCircle_px), most_px);
     std::vector<GateCandidate> candidates;
     for (const FoundMark& mark : found) {
-      candidates.push_back({mark.pixel_px, mark.sigma_px, mark.diameter_px});
+      candidates.push_back({mark.pixel_px, mark.sigma_px, mark.diameter_px, mark.bias_px});
     }
     TakeMatches(large, diameters_m, candidates);
   }
@@ -164,7 +239,7 @@ class Search {
     if (!found) return;
     std::vector<GateCandidate> candidates;
     for (const Centre& centre : (*found)->centres) {
-      candidates.push_back({centre.pixel_px, std::hypot(centre.sigma_px, kLedFloor_px), 0.0});
+      candidates.push_back({centre.pixel_px, std::hypot(centre.sigma_px, kLedFloor_px), 0.0, 0.0});
     }
     TakeMatches(leds, std::vector<double>(leds.size(), 0.0), candidates);
   }
@@ -177,6 +252,10 @@ class Search {
          MatchInGates(targets, diameters_m, candidates, area_px2, &*gates_)) {
       if (match.verdict == MatchVerdict::kMatched) {
         const GateCandidate& one = candidates[match.candidate];
+        if (one.bias_px > kMostBias_px) {
+          why_[match.target] = TargetRefusal::kTilted;
+          continue;
+        }
         seen_[match.target] = TargetSeen{match.target, one.pixel_px, one.sigma_px};
       } else if (match.verdict == MatchVerdict::kAmbiguous) {
         why_[match.target] = TargetRefusal::kAmbiguous;
@@ -184,30 +263,44 @@ class Search {
     }
   }
 
+  // All that was taken, the points of a board together.
+  std::vector<Found> Taken() const {
+    std::vector<Found> taken;
+    const auto add = [&](const std::vector<std::size_t>& targets) {
+      Found found;
+      for (const std::size_t target : targets) {
+        if (seen_[target] && Expects(target)) found.push_back(*seen_[target]);
+      }
+      if (!found.empty()) taken.push_back(std::move(found));
+    };
+    for (const SoughtBoard& board : boards_) add(board.targets);
+    for (std::size_t i = 0; i < targets_.size(); ++i) {
+      if (targets_[i].mark.kind != TargetKind::kBoard) add({i});
+    }
+    return taken;
+  }
+
   // Each against what all others say; the worst goes first.
   void DropWhatDoesNotFit() {
     for (;;) {
-      std::vector<std::size_t> all;
-      for (std::size_t i = 0; i < seen_.size(); ++i) {
-        // A board's points were taken together, and checked by its own plane.
-        if (seen_[i] && Expects(i) && targets_[i].mark.kind != TargetKind::kBoard) all.push_back(i);
-      }
-      std::optional<std::size_t> worst;
+      const std::vector<Found> all = Taken();
+      const Found* worst = nullptr;
       double most = 0.0;
-      for (const std::size_t one : all) {
+      for (const Found& found : all) {
         TargetGates others(*ahead_.expected);
-        for (const std::size_t other : all) {
-          if (other != one) others.Take(other, seen_[other]->pixel_px, seen_[other]->sigma_px);
+        for (const Found& other : all) {
+          if (&other != &found) TakeAsOne(other, &others);
         }
-        const auto gate = others.At(one, seen_[one]->sigma_px);
-        const double distance = gate.Distance(seen_[one]->pixel_px);
-        if (gate.Has(seen_[one]->pixel_px) || distance < most) continue;
+        const double distance = Distance(others, found);
+        if (Fits(others, found) || distance < most) continue;
         most = distance;
-        worst = one;
+        worst = &found;
       }
-      if (!worst) return;
-      seen_[*worst].reset();
-      why_[*worst] = TargetRefusal::kTooFar;
+      if (worst == nullptr) return;
+      for (const TargetSeen& one : *worst) {
+        seen_[one.target].reset();
+        why_[one.target] = TargetRefusal::kTooFar;
+      }
     }
   }
 
@@ -252,6 +345,7 @@ class Search {
   const std::span<const SoughtTarget> targets_;
   const TargetsAhead& ahead_;
   std::optional<TargetGates> gates_;
+  const std::vector<SoughtBoard> boards_;
   std::vector<TargetRefusal> why_;
   std::vector<std::optional<TargetSeen>> seen_;
 };
@@ -274,6 +368,8 @@ std::string_view Word(TargetRefusal refusal) {
       return "covered";
     case TargetRefusal::kNoExpectation:
       return "no_expectation";
+    case TargetRefusal::kTilted:
+      return "tilted";
   }
   return "";
 }

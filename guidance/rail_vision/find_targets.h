@@ -18,11 +18,12 @@ namespace tbm {
 struct SoughtTarget {
   TargetMark mark;
   Eigen::Vector3d in_world_m = Eigen::Vector3d::Zero();  // z up
+  double sigma_m = 0.0;                                  // of each coordinate
 };
 
 // What is known before the image is looked at. Without an expectation only what names itself is
-// found: coded targets, and boards where they do not look the same turned or `up_in_camera` tells
-// their upper side.
+// found: coded targets, and boards of a form that no other board has, where they do not look the
+// same turned or `up_in_camera` tells their upper side.
 struct TargetsAhead {
   std::optional<ExpectedImage> expected;
   std::optional<Eigen::Vector3d> up_in_camera;
@@ -36,6 +37,8 @@ enum class TargetRefusal {
   kAtEdge,         // at the edge of the image, not whole
   kCovered,        // seen, but too much of its edge is hidden or blurred
   kNoExpectation,  // does not name itself, and nobody knows where it would be
+  kTilted,         // a circle so large and so tilted that the two places where its middle may be
+                   // are too far from each other
 };
 std::string_view Word(TargetRefusal refusal);  // "not_found", ..
 

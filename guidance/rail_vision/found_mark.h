@@ -19,14 +19,15 @@ struct FoundMark {
   Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();  // picture of its middle, distorted
   double sigma_px = 0.0;                               // of one coordinate
   double diameter_px = 0.0;                            // of a circle
-  int code = -1;                                       // of a coded mark
+  double bias_px = 0.0;  // part of sigma: the same in every image that is taken from there
+  int code = -1;         // of a coded mark
 };
 
 // Discs of `least_px` to `most_px` across, dark or light, whole within the image. An edge by its
 // half-way grey values, an ellipse through them without the lens' distortion. The middle of a
 // circle's picture is not the picture of its middle: an ellipse tells the circle's plane but for
-// its sign, so the point half way between both answers is taken, and half of their distance is in
-// sigma.
+// its sign, so the point half way between both answers is taken, and half of their distance is the
+// bias.
 std::vector<FoundMark> FindCircles(const cv::Mat& grey,
                                    const CameraModel& camera,
                                    double least_px,

@@ -22,12 +22,14 @@ constexpr double kLeastContrast_dn = 4.0;
 constexpr float kClearlyNearer = 0.75f;  // than the next best, in distance of descriptors
 constexpr double kRansac_px = 2.0;
 constexpr double kLeastInliers = 0.75;  // of the matches
-// Of the residuals of a free projective matrix: more and the ground is no level plane.
+// Of the residuals of a free projective matrix: more and the ground is no such plane.
 constexpr double kMostTimesFree = 1.6;
 constexpr double kSlack_px = 0.05;
 // Features look at the same pixels as their neighbours do: they count for fewer than they are.
 constexpr double kShared = 1.5;
 constexpr unsigned kSeed = 20260522;
+// Of the ground's grade, and of its cross-fall: a tunnel's are a few percent.
+constexpr double kSigmaSlope = 0.05;
 
 struct Match {
   Eigen::Vector2d first;
@@ -109,46 +111,49 @@ FreeFit FitFreely(const std::vector<Match>& matches, double f_px) {
   return fit;
 }
 
-// Least squares of shift (in heights) and small turn over level ground.
+// Least squares of shift (in heights), small turn, and slope of the ground.
 class PlaneFit {
  public:
   PlaneFit(const std::vector<Match>& matches, const GroundAttitudes& attitudes, double f_px)
       : matches_(matches),
         f_px_(f_px),
         up_in_first_(attitudes.world_from_first.conjugate() * Eigen::Vector3d::UnitZ()),
-        second_from_first_(attitudes.world_from_second.conjugate() * attitudes.world_from_first),
-        sigma_turn_rad_(attitudes.sigma_turn_rad) {}
+        second_from_first_(attitudes.world_from_second.conjugate() * attitudes.world_from_first) {
+    level_in_first_.col(0) = up_in_first_.unitOrthogonal();
+    level_in_first_.col(1) = up_in_first_.cross(level_in_first_.col(0));
+    by_sigma2_.segment<3>(kTurn).setConstant(1.0 / Square(attitudes.sigma_turn_rad));
+    by_sigma2_.segment<2>(kSlope).setConstant(1.0 / Square(kSigmaSlope));
+  }
 
   // Nothing where a ray of the image does not reach the ground, or no minimum is found.
   std::optional<GroundMotion> Solve() {
     constexpr int kRounds = 30;
     const auto count = static_cast<double>(matches_.size());
-    // The turn's prior needs the points' noise to be weighed against: a guess first.
+    // What is known before needs the points' noise to be weighed against: a guess first.
     double rms_px = 0.3;
-    Eigen::Matrix<double, 6, 1> state = Eigen::Matrix<double, 6, 1>::Zero();
+    State state = State::Zero();
     for (int round = 0; round < kRounds; ++round) {
-      Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-      Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
+      Normal normal = Normal::Zero();
+      State right = State::Zero();
       double sum = 0.0;
+      const Scene scene = At(state);
       for (const Match& match : matches_) {
-        if (!Add(match, state, &normal, &right, &sum)) return {};
+        if (!Add(match, scene, &normal, &right, &sum)) return {};
       }
-      const double prior = kShared * rms_px * rms_px / (sigma_turn_rad_ * sigma_turn_rad_);
-      for (int i = 3; i < 6; ++i) {
-        normal(i, i) += prior;
-        right[i] -= prior * state[i];
-      }
-      const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> solver(normal);
-      const Eigen::Matrix<double, 6, 1> step = solver.solve(right);
+      const State prior = kShared * rms_px * rms_px * by_sigma2_;
+      normal.diagonal() += prior;
+      right -= prior.cwiseProduct(state);
+      const Eigen::LDLT<Normal> solver(normal);
+      const State step = solver.solve(right);
       if (!step.allFinite()) return {};
       state += step;
-      const double seen_px = std::sqrt(sum / (2.0 * count - 3.0));
+      const double seen_px = std::max(1e-3, std::sqrt(sum / (2.0 * count - 3.0)));
       const bool is_settled = step.norm() < 1e-10 && std::abs(seen_px - rms_px) < 1e-6;
-      rms_px = std::max(seen_px, 1e-3);
-      if (!is_settled && round + 1 < kRounds) continue;
+      rms_px = seen_px;
+      if (!is_settled) continue;
       GroundMotion motion;
       motion.moved = state.head<3>();
-      motion.turn_rad = state.tail<3>();
+      motion.turn_rad = state.segment<3>(kTurn);
       motion.covariance = kShared * rms_px * rms_px * normal.inverse().topLeftCorner<3, 3>();
       motion.rms_px = rms_px;
       motion.inliers = matches_.size();
@@ -158,25 +163,49 @@ class PlaneFit {
   }
 
  private:
-  bool Add(const Match& match,
-           const Eigen::Matrix<double, 6, 1>& state,
-           Eigen::Matrix<double, 6, 6>* normal,
-           Eigen::Matrix<double, 6, 1>* right,
-           double* sum) const {
+  // Shift, turn, slope along two level directions.
+  static constexpr int kTurn = 3;
+  static constexpr int kSlope = 6;
+  static constexpr int kSize = 8;
+  using State = Eigen::Matrix<double, kSize, 1>;
+  using Normal = Eigen::Matrix<double, kSize, kSize>;
+
+  static double Square(double value) { return value * value; }
+
+  struct Scene {
+    Eigen::Vector3d shift;
+    Eigen::Matrix3d turn;
+    Eigen::Vector3d normal;  // of the ground, upwards, in the first camera
+    Eigen::Matrix<double, 3, 2> normal_by_slope;
+  };
+  Scene At(const State& state) const {
+    Scene scene;
+    scene.shift = state.head<3>();
+    scene.turn = (ExpRotation(state.segment<3>(kTurn)) * second_from_first_).toRotationMatrix();
+    const Eigen::Vector3d leaning = up_in_first_ + level_in_first_ * state.tail<2>();
+    scene.normal = leaning.normalized();
+    scene.normal_by_slope =
+        (level_in_first_ - scene.normal * (scene.normal.transpose() * level_in_first_)) /
+        leaning.norm();
+    return scene;
+  }
+
+  bool Add(
+      const Match& match, const Scene& scene, Normal* normal, State* right, double* sum) const {
     const Eigen::Vector3d ray = match.first.homogeneous();
-    const double down = -up_in_first_.dot(ray);
+    const double down = -scene.normal.dot(ray);
     if (down < 0.05) return false;
-    const Eigen::Matrix3d turn =
-        (ExpRotation(state.tail<3>()) * second_from_first_).toRotationMatrix();
-    const Eigen::Vector3d in_second = turn * (ray / down - state.head<3>());
+    const Eigen::Vector3d in_second = scene.turn * (ray / down - scene.shift);
     if (in_second.z() < 0.05) return false;
     const double z = in_second.z();
     Eigen::Matrix<double, 2, 3> by_point;
     by_point << 1.0 / z, 0.0, -in_second.x() / (z * z), 0.0, 1.0 / z, -in_second.y() / (z * z);
     by_point *= f_px_;
-    Eigen::Matrix<double, 2, 6> by_state;
-    by_state.leftCols<3>() = -by_point * turn;
-    by_state.rightCols<3>() = -by_point * Skew(in_second);
+    Eigen::Matrix<double, 2, kSize> by_state;
+    by_state.leftCols<3>() = -by_point * scene.turn;
+    by_state.middleCols<3>(kTurn) = -by_point * Skew(in_second);
+    by_state.rightCols<2>() =
+        by_point * (scene.turn * ray) / (down * down) * (ray.transpose() * scene.normal_by_slope);
     const Eigen::Vector2d off_px = f_px_ * (match.second - in_second.hnormalized());
     *normal += by_state.transpose() * by_state;
     *right += by_state.transpose() * off_px;
@@ -187,8 +216,9 @@ class PlaneFit {
   const std::vector<Match>& matches_;
   const double f_px_;
   const Eigen::Vector3d up_in_first_;
+  Eigen::Matrix<double, 3, 2> level_in_first_;
   const Eigen::Quaterniond second_from_first_;
-  const double sigma_turn_rad_;
+  State by_sigma2_ = State::Zero();  // 1 / sigma^2 of what is known before
 };
 
 std::optional<GroundFailure> Unusable(const GroundFeatures& features) {

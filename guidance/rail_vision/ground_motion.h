@@ -26,7 +26,8 @@ enum class GroundFailure {
   kNoTexture,      // the ground looks everywhere the same, or there is no light
   kBlurred,        // there are light and dark, but nothing sharp to be known again
   kTooFewMatches,  // the images hardly overlap, or do not show the same
-  kNotAPlane,      // what matches does not move as level ground seen from that attitude does
+  kNotAPlane,      // what matches does not move as a plane that is nearly level, seen from that
+                   // attitude, does
 };
 const char* Word(GroundFailure failure);  // "no_texture", ..
 
@@ -37,8 +38,8 @@ struct GroundAttitudes {
   double sigma_turn_rad = 1e-4;  // of the turn from one to the other, about each axis, > 0
 };
 
-// How the camera moved over level ground, in heights of the camera above it: the height is not seen
-// in the images.
+// How the camera moved over the ground, in heights of the camera above it, square to the ground:
+// the height is not seen in the images.
 struct GroundMotion {
   Eigen::Vector3d moved;       // second place from the first, in the first camera's axes
   Eigen::Matrix3d covariance;  // of it
@@ -51,7 +52,8 @@ struct GroundMotion {
 // The patent's steps (CN106052584): FLANN matches of SIFT features that are clearly nearer than the
 // next best, RANSAC for a projective matrix, its least squares on the inliers. Of the matrix only
 // what the ground's plane and the known attitudes leave open is then estimated: three numbers of
-// shift, and three of a turn that is small (docs/vision.md). Random choices start from a fixed
+// shift, three of a turn that is small, and two of the ground's grade and cross-fall, some percent
+// (docs/vision.md). Random choices start from a fixed
 // seed: the same images give the same bits.
 Result<GroundMotion, GroundFailure> MeasureGroundMotion(const GroundFeatures& first,
                                                         const GroundFeatures& second,

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Eigenvalues>
+
 #include "pose/geometry/rigid3.h"
 
 namespace tbm {
@@ -62,9 +64,10 @@ GroundDisplacement DisplacementOf(const RailGroundCamera& camera,
           .head<2>();
   const Eigen::Matrix3d covariance =
       vehicle_from_camera * motion.covariance * vehicle_from_camera.transpose();
-  const double sigma_m =
-      camera.height_m * std::sqrt(0.5 * covariance.topLeftCorner<2, 2>().trace());
-  displacement.sigma_m = std::hypot(sigma_m, camera.sigma_m);
+  // One number for both axes: that of the worst direction.
+  const Eigen::Matrix2d across = covariance.topLeftCorner<2, 2>();
+  const double largest = across.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff();
+  displacement.sigma_m = std::hypot(camera.height_m * std::sqrt(largest), camera.sigma_m);
   return displacement;
 }
 

@@ -67,6 +67,7 @@ struct GateCandidate {
   Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
   double sigma_px = 0.0;
   double diameter_px = 0.0;  // 0: has no size, as a lamp
+  double bias_px = 0.0;      // part of sigma that stays the same from image to image
 };
 
 enum class MatchVerdict { kMatched, kNothingThere, kAmbiguous };

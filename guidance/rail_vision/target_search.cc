@@ -23,7 +23,7 @@ class TargetSearch {
     for (std::size_t i = 0; i < marks.size(); ++i) {
       if (!marks[i]) continue;
       looked_for_.push_back(static_cast<int>(i));
-      sought_.push_back({*marks[i], recording.targets[i].in_world_m});
+      sought_.push_back({*marks[i], recording.targets[i].in_world_m, recording.targets[i].sigma_m});
       surveyed_.push_back(recording.targets[i]);
     }
   }

@@ -144,6 +144,23 @@ TEST_F(TargetsCommand, FindsTheTargetsFromWhichTheLineIsMade) {
   EXPECT_LT(truth["error_over_sigma"], 1.6);
 }
 
+// Whoever surveyed them looks for them in the report.
+TEST_F(TargetsCommand, ListsTargetsThatAreInNoImage) {
+  auto targets = kTargets;
+  targets.push_back({"BEHIND", "coded:8", {1.0, 30.0, 1.5}});
+  targets.push_back({"BESIDE", "circle:60", {9.0, 10.6, 1.5}});
+  targets.push_back({"UNMARKED", "", {1.0, 10.6, 1.5}});
+  run_->WriteTargets(targets);
+  ASSERT_EQ(Targets(run_->path(), *run_ / "centres.csv").code, ExitCode::kDone);
+  const Json report = Json::parse(test::ReadText(*run_ / "centres.json"));
+  ASSERT_EQ(report["targets"].size(), kTargets.size() + 2);
+  for (const Json& one : report["targets"]) {
+    const std::string name = one["target"];
+    if (name != "BEHIND" && name != "BESIDE") continue;
+    EXPECT_EQ(one, (Json{{"target", name}, {"outside", report["frames"]}, {"seen", 0}}));
+  }
+}
+
 TEST_F(TargetsCommand, LeavesOutTargetsWhoseNamesAreExchanged) {
   auto targets = kTargets;
   targets.push_back({"C7", "coded:7", {0.9, 10.6, 1.25}});
@@ -180,6 +197,8 @@ TEST_F(TargetsCommand, SaysWhatIsMissing) {
   const std::string targets = "target,x_m,y_m,z_m,sigma_mm,kind\n";
   EXPECT_THAT(complaint("targets.csv", "target,x_m,y_m,z_m,sigma_mm\nA,1,2,3,0.1\n"),
               HasSubstr("targets.csv: has no column kind"));
+  EXPECT_THAT(complaint("targets.csv", targets + "A,1,2,3,0.1,\nB,1,2,3,0.1,\n"),
+              HasSubstr("targets.csv: has no column kind, or nothing in it"));
   EXPECT_THAT(complaint("targets.csv", targets + "A,1,2,3,0.1,prism\n"),
               testing::AllOf(HasSubstr("targets.csv:2: column kind"), HasSubstr("coded:NUMBER")));
   EXPECT_THAT(complaint("targets.csv", targets + "A,1,2,3,0.1,coded:3\nB,1,2,3,0.1,coded:3\n"),
