@@ -67,7 +67,7 @@ std::string Yaml(const RailSetup& setup) {
   if (setup.ground) {
     text += "ground_camera:\n" + Lens(setup.ground->model) +
             Mounting(setup.ground->camera_from_imu, setup.ground->in_imu_m) +
-            fmt::format("  sigma_rotation_deg: 0.1\n  height_m: {}\n  sigma_height_mm: {}\n",
+            fmt::format("  sigma_rotation_deg: 0.02\n  height_m: {}\n  sigma_height_mm: {}\n",
                         setup.ground->height_m,
                         1e3 * setup.ground->sigma_height_m);
   }
