@@ -30,7 +30,7 @@ const double kLeastYaw_rad = DegToRad(20.0);
 constexpr int kMostSteps = 200;
 constexpr int kRefinements = 30;
 // By this the sigmas of a placement that is left out grow.
-constexpr double kLeftOut = 1e3;
+constexpr double kSigmaOfLeftOut = 1e3;
 
 // vec() by columns, as in the paper's Kronecker products.
 Eigen::Matrix3d MatrixOf(const Vector9& v) { return Eigen::Map<const Eigen::Matrix3d>(v.data()); }
@@ -142,7 +142,7 @@ class TiltAdjustment {
     found.up_in_board = up_;
     if (!options_.up_in_board) {
       const Eigen::Matrix2d up = spread_.bottomRightCorner<2, 2>();
-      found.up_sigma_rad = std::sqrt(up.eigenvalues().real().maxCoeff());
+      found.up_sigma_rad = std::sqrt(up.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff());
     }
     found.chi2 = fit.chi2;
     found.dof = fit.dof;
@@ -170,7 +170,7 @@ class TiltAdjustment {
     equation.by.leftCols<3>() = plane.transpose() * -Skew(felt);
     equation.by.rightCols<2>() = -plane.transpose() * one.camera_from_board * TangentsOf(up_);
     equation.sigma_rad =
-        (is_out_[i] ? kLeftOut : 1.0) * std::hypot(one.camera_sigma_rad, one.tilt_sigma_rad);
+        (is_out_[i] ? kSigmaOfLeftOut : 1.0) * std::hypot(one.camera_sigma_rad, one.tilt_sigma_rad);
     return equation;
   }
 
@@ -248,7 +248,7 @@ TiltRotationFailure FailureOf(TiltRotationFault fault,
 }
 
 double Sigma_rad(const TiltRotation& found) {
-  return std::sqrt(found.covariance.eigenvalues().real().maxCoeff());
+  return std::sqrt(found.covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff());
 }
 
 // Why the placements contradict one another, if they do. `found` is of all of them.
@@ -334,7 +334,8 @@ double MountingSigma_rad(const Eigen::Matrix3d& covariance,
 }
 
 Eigen::Matrix3d StartTiltRotation(std::span<const TiltPlacement> placements) {
-  const Eigen::SelfAdjointEigenSolver<Matrix9> axes(NormalMatrix(placements));
+  // Of dynamic size: nine fixed ones take the compiler long.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(NormalMatrix(placements));
   Eigen::Matrix3d start = MatrixOf(axes.eigenvectors().col(0));
   if (start.determinant() < 0.0) start = -start;
   return NearestRotation(start);
@@ -350,7 +351,7 @@ Eigen::Matrix3d AugmentedLagrangianTiltRotation(std::span<const TiltPlacement> p
   Eigen::Matrix3d multiplier = Eigen::Matrix3d::Zero();
   double mu = 1e-2;
   for (*steps = 1; *steps <= kMostSteps; ++*steps) {
-    const Matrix9 left = 2.0 * normal + mu * Matrix9::Identity();
+    const Eigen::MatrixXd left = 2.0 * normal + mu * Matrix9::Identity();
     const Vector9 right = mu * VectorOf(m) + VectorOf(multiplier);
     const Eigen::Matrix3d r = MatrixOf(left.ldlt().solve(right));
     m = NearestRotation(r - multiplier / mu);

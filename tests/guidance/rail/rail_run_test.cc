@@ -49,7 +49,9 @@ TEST(SmallRailRun, IsReadWholeAndSolved) {
 TEST(RailRunBytes, CutFlippedAndGluedFilesAreRefusedOrReadAsTheyStand) {
   const RailRunTexts whole = SmallRailRun();
   Random random("rail run bytes");
-  for (const auto& [name, text] : whole) {
+  for (const auto& file : whole) {
+    const std::string& name = file.first;
+    const std::string& text = file.second;
     SCOPED_TRACE(name);
     const auto with = [&](std::string other) {
       RailRunTexts texts = whole;
