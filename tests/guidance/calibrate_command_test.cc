@@ -341,7 +341,8 @@ TEST_F(CalibrateTilt, ReadingsWorseThanDeclaredMakeTheSigmaLargerAndAreRefusedBe
   EXPECT_GT(scaled.mounting_sigma_rad, 1.5 * honest.mounting_sigma_rad);
   const Eigen::AngleAxisd off(
       Eigen::Matrix3d(scaled.tilt_from_body * test::TiltingTable::FloorCameraFromHousing()));
-  EXPECT_LT(std::abs(off.angle()), 4.0 * scaled.mounting_sigma_rad);
+  // Of the turn about the housing's z, which tilts find worst, that sigma holds a sixth.
+  EXPECT_LT(std::abs(off.angle()), 6.0 * scaled.mounting_sigma_rad);
   auto bad = noisy(0.3);
   bad.out = folder_ / "bad.yaml";
   const Outcome refused = Ran(RunCalibrateTilt, bad);

