@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <sstream>
 
 #include <fmt/format.h>
 
@@ -40,23 +41,11 @@ std::size_t UsedPictures(const CameraCalibration& found) {
 }
 
 // The camera as a rig file has it, to stand under `calibrated`.
-std::string FoundWithYaml(const CameraModel& c) {
-  return fmt::format(
-      "  camera:   # that the rotation was found with, and belongs to\n"
-      "    image_width: {}\n    image_height: {}\n"
-      "    camera_matrix: {{data: [{}, 0.0, {}, 0.0, {}, {}, 0.0, 0.0, 1.0]}}\n"
-      "    distortion_coefficients: {{data: [{}, {}, {}, {}, {}]}}\n",
-      c.image_width_px,
-      c.image_height_px,
-      c.fx_px,
-      c.cx_px,
-      c.fy_px,
-      c.cy_px,
-      c.k1,
-      c.k2,
-      c.p1,
-      c.p2,
-      c.k3);
+std::string FoundWithYaml(const CameraModel& lens) {
+  std::string text = "  camera:   # that the rotation was found with, and belongs to\n";
+  std::istringstream lines(LensYaml(lens));
+  for (std::string line; std::getline(lines, line);) text += "  " + line + "\n";
+  return text;
 }
 
 }  // namespace

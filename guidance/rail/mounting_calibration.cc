@@ -32,6 +32,7 @@ constexpr double kSettled = 0.01;  // sigma of what is asked for
 constexpr double kMostGone = 0.1;
 constexpr double kMostChi2 = 2.0;  // over its degrees of freedom
 constexpr double kStill_m_s = 2e-4;
+constexpr double kRate_s = 0.05;
 
 constexpr int kNode = 9;  // position, velocity, attitude: the first rows of FusionLayout
 constexpr int kShared = 13;
@@ -55,7 +56,7 @@ struct Point {
 struct Node {
   Timestamp at;
   Motion motion;
-  Eigen::Vector3d gyro_rad_s = Eigen::Vector3d::Zero();  // of the sample at the stamp
+  Eigen::Vector3d gyro_rad_s = Eigen::Vector3d::Zero();  // the mean of kRate_s around it
   bool rests = false;
   std::vector<Point> points;
 };
@@ -143,9 +144,8 @@ class Batch {
     for (const TargetImage& image : recording_.images) {
       if (image.pixels.size() < kLeastPoints) continue;
       const Timestamp at = image.stamped_at + Duration(std::llround(1e9 * exposed_after_stamp_s_));
-      const auto sample = std::ranges::lower_bound(recording_.imu, at, {}, &ImuSample::ends_at);
-      if (sample == recording_.imu.end() || at < begin) continue;
-      Node node{at, motion, sample->gyro_rad_s, false, {}};
+      if (at < begin || recording_.imu.back().ends_at < at) continue;
+      Node node{at, motion, RateAround(at), false, {}};
       node.rests = SecondsBetween(begin, node.at) <= setup_.start.at_rest_s;
       for (const TargetPixel& pixel : image.pixels) {
         node.points.push_back(
@@ -211,6 +211,24 @@ class Batch {
   Eigen::Index SharedAt() const { return kNode * static_cast<Eigen::Index>(nodes_.size()); }
   Eigen::Index TargetAt(int target) const { return SharedAt() + kShared + 3 * target; }
   Eigen::Index Size() const { return TargetAt(static_cast<int>(targets_.size())); }
+
+  // What turns the unit at an exposure says how the offset of the clocks moves its image. Of one
+  // sample alone the noise is in the way to the image as well, and would be taken for an offset:
+  // around it, as much before as behind.
+  Eigen::Vector3d RateAround(Timestamp at) const {
+    const Duration half = Duration(std::llround(0.5e9 * kRate_s));
+    Eigen::Vector3d sum_rad = Eigen::Vector3d::Zero();
+    double whole_s = 0.0;
+    for (auto sample = std::ranges::upper_bound(recording_.imu, at - half, {}, &ImuSample::ends_at);
+         sample != recording_.imu.end() && BeginOfRun(*sample) < at + half;
+         ++sample) {
+      const double span_s = SecondsBetween(std::max(BeginOfRun(*sample), at - half),
+                                           std::min(sample->ends_at, at + half));
+      sum_rad += span_s * sample->gyro_rad_s;
+      whole_s += span_s;
+    }
+    return sum_rad / whole_s;
+  }
 
   FusionState StateAt(const Node& node) const {
     FusionState state = shared_;
