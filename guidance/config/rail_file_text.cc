@@ -31,9 +31,9 @@ std::string RailCameraYaml(const RailCamera& camera, const std::vector<std::stri
   }
   text += fmt::format(
       "  rotation: [{}]   # imu frame into camera, row by row\n"
-      "  position_m: [{}, {}, {}]   # of the camera in the imu frame\n"
-      "  sigma_rotation_deg: {}\n  sigma_position_mm: {}\n"
-      "  time_offset_s: {}   # camera stamp minus imu time\n  sigma_time_offset_s: {}\n",
+      "  position_m: [{:.7f}, {:.7f}, {:.7f}]   # of the camera in the imu frame\n"
+      "  sigma_rotation_deg: {:.4g}\n  sigma_position_mm: {:.4g}\n"
+      "  time_offset_s: {:.7f}   # camera stamp minus imu time\n  sigma_time_offset_s: {:.4g}\n",
       numbers,
       camera.in_imu_m.x(),
       camera.in_imu_m.y(),

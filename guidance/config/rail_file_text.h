@@ -8,7 +8,8 @@
 
 namespace tbm {
 
-// The section `camera` of rail.yaml: rotation to a trillionth, all else to the last bit. Each line
+// The section `camera` of rail.yaml: rotation to a trillionth, position
+// to a tenth of a micrometre, offset to a tenth of a microsecond, sigmas to four digits. Each line
 // of `remarks` stands in it as a comment.
 std::string RailCameraYaml(const RailCamera& camera, const std::vector<std::string>& remarks);
 
