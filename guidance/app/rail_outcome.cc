@@ -27,9 +27,10 @@ struct ReadLine {
 Result<ReadLine, std::string> Read(const std::string& path) {
   auto text = ReadTextFile(path);
   if (!text) return Failure{text.error().Text()};
-  auto line = ReadLineFile(path);
+  std::string sha256 = Sha256(*text);
+  auto line = ParseLineFile(std::move(text).value(), path);
   if (!line) return Failure{line.error().front().Text()};
-  return ReadLine{std::move(line).value(), Sha256(*text)};
+  return ReadLine{std::move(line).value(), std::move(sha256)};
 }
 
 // The base's run is named by its folder.

@@ -43,7 +43,8 @@ std::optional<std::string> RailRecorder::Begin() {
   std::error_code error;
   const fs::path parent = fs::path(folder_).parent_path();
   if (!parent.empty()) fs::create_directories(parent, error);
-  const bool is_new = !error && !fs::exists(folder_) && fs::create_directory(unfinished_, error);
+  const bool is_new =
+      !error && !fs::exists(folder_, error) && fs::create_directory(unfinished_, error);
   if (error) return Told(unfinished_, error.value());
   if (!is_new) return folder_ + ": is there already";
   if (const int failed = WriteWhole(PathOf("rail.yaml"), setup_.rail_yaml)) {

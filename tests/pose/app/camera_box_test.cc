@@ -353,12 +353,12 @@ TEST_F(CameraBoxTest, ADeadChannelHasAReasonOfItsOwn) {
 TEST_F(CameraBoxTest, FramesThatComeTooFastAreSkippedAndCounted) {
   sink_.pose_takes_ms = 150;
   CameraBox box(config_, rig_, "hash", MakeParts(), clock_, sink_);
-  RunBox(box, 8);
-  ASSERT_GE(sink_.features.size(), 8u);
+  // Twice as many as an idle computer needs for it: on a busy one frames come slower.
+  RunBox(box, 16);
+  ASSERT_GE(sink_.features.size(), 16u);
   const dds::FrameFeatures& last = sink_.features.back();
-  // At least one for each that was taken but the first two, also where the computer is busy.
-  EXPECT_GE(last.frames_skipped, 3u);
-  EXPECT_GE(last.frame_number, sink_.features.front().frame_number + 10);
+  EXPECT_GE(last.frames_skipped, 5u);
+  EXPECT_GE(last.frame_number, sink_.features.front().frame_number + 14);
   EXPECT_LE(last.frames_skipped, last.frames_received);
 }
 
