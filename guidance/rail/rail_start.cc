@@ -146,9 +146,10 @@ Result<Eigen::Quaterniond, RailStartFailure> FindStartAttitude(const RailSetup& 
   Eigen::Vector3d up_in_imu = rest.mean_accel_m_s2.normalized();
   if (const auto by_tilt = UpByTilt(setup, recording)) {
     const double off_rad = std::atan2(up_in_imu.cross(*by_tilt).norm(), up_in_imu.dot(*by_tilt));
-    const double most_rad = kSure * std::hypot(setup.imu.accel_bias_sigma_m_s2 / setup.gravity_m_s2,
-                                               setup.tilt->sigma_rad,
-                                               kTiltMounting_rad);
+    const double most_rad =
+        kSure * std::hypot(setup.imu.accel_bias_sigma_m_s2 / setup.gravity_m_s2,
+                           setup.tilt->sigma_rad,
+                           std::max(kTiltMounting_rad, setup.tilt->sigma_rotation_rad));
     if (off_rad > most_rad) {
       return Fail(
           {.fault = RailStartFault::kTiltDisagrees, .off_rad = off_rad, .most_rad = most_rad});

@@ -57,8 +57,9 @@ Result<RestSignature, RailStartFailure> FindRestSignature(const RailSetup& setup
 
 // The attitude at the start: level by the inclinometer (or the accelerometers), heading as given or
 // turned until the first images' targets lie where they should. An inclinometer is believed where
-// it and the accelerometers agree within four sigma of their bias, its noise and 0.05 degree for
-// its mounting: angles in another unit or of the other sign do not, unless the start is level.
+// it and the accelerometers agree within four sigma of their bias, its noise and its mounting
+// (at least 0.05 degree): angles in another unit or of the other sign do not, unless the start is
+// level.
 Result<Eigen::Quaterniond, RailStartFailure> FindStartAttitude(const RailSetup& setup,
                                                                const RailRecording& recording,
                                                                const RestSignature& rest);

@@ -137,8 +137,9 @@ void RailTracker::WeighSurvey() {
                                state.camera_from_imu * -state.camera_in_imu_m};
   TargetView view{camera_from_imu * Inverse(world_from_imu), {}};
   for (const TargetPixel& pixel : newest_image_->pixels) view.targets.push_back(pixel.target);
-  const double level_rad =
-      setup_.tilt ? setup_.tilt->sigma_rad : setup_.imu.accel_bias_sigma_m_s2 / setup_.gravity_m_s2;
+  const double level_rad = setup_.tilt
+                               ? std::hypot(setup_.tilt->sigma_rad, setup_.tilt->sigma_rotation_rad)
+                               : setup_.imu.accel_bias_sigma_m_s2 / setup_.gravity_m_s2;
   survey_sigma_m_ = SurveySigma(
       view, setup_.camera->model, setup_.camera->residual_px, std::max(level_rad, 1e-6), targets_);
   newest_image_.reset();

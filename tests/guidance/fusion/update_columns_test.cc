@@ -31,7 +31,9 @@ const FusionLayout kLayout({FusionOption::kTiltOffset,
                             FusionOption::kCameraRotation,
                             FusionOption::kCameraPosition,
                             FusionOption::kOdometerScale,
-                            FusionOption::kImageScale},
+                            FusionOption::kOdometerTurn,
+                            FusionOption::kImageScale,
+                            FusionOption::kImageTurn},
                            3);
 
 FusionState SomeState() {
@@ -49,7 +51,9 @@ FusionState SomeState() {
   state.camera_from_imu = ExpRotation({0.1, 0.2, -0.1}) * Eigen::Quaterniond(ahead);
   state.camera_in_imu_m = {0.15, -0.05, 0.1};
   state.odometer_scale = 0.03;
+  state.odometer_turn_rad = {1e-3, -2e-3};
   state.image_scale = -0.04;
+  state.image_turn_rad = 0.3;
   state.modes.setConstant(3, 0.3);
   return state;
 }
@@ -113,6 +117,10 @@ void ExpectColumns(const Case& one) {
   }
 }
 
+Eigen::Quaterniond OdometerTurn(const FusionState& state) {
+  return ExpRotation({0.0, state.odometer_turn_rad.x(), state.odometer_turn_rad.y()});
+}
+
 TEST(UpdateColumns, OfTheOdometer) {
   const OdometerMounting mounting{ExpRotation({0.1, -0.1, 0.3}), {0.4, -0.3, -0.5}, kSigma, kSigma};
   Case one;
@@ -120,7 +128,9 @@ TEST(UpdateColumns, OfTheOdometer) {
   const Eigen::Vector3d lever_m_s =
       (kSample.gyro_rad_s - one.state.gyro_bias_rad_s).cross(mounting.wheel_in_imu_m);
   const Eigen::Matrix3d world_from_vehicle =
-      (one.state.motion.world_from_imu * mounting.vehicle_from_imu.conjugate()).toRotationMatrix();
+      (one.state.motion.world_from_imu *
+       (OdometerTurn(one.state) * mounting.vehicle_from_imu).conjugate())
+          .toRotationMatrix();
   one.state.motion.velocity_world_m_s = world_from_vehicle * Eigen::Vector3d(0.8, 0.0, 0.0) -
                                         one.state.motion.world_from_imu * lever_m_s;
   one.zeros = {world_from_vehicle.col(1), world_from_vehicle.col(2)};
@@ -128,8 +138,8 @@ TEST(UpdateColumns, OfTheOdometer) {
     const Eigen::Vector3d rate = kSample.gyro_rad_s - state.gyro_bias_rad_s;
     const Eigen::Vector3d unit_m_s =
         state.motion.world_from_imu.conjugate() * state.motion.velocity_world_m_s;
-    const Eigen::Vector3d wheel_m_s =
-        mounting.vehicle_from_imu * (unit_m_s + rate.cross(mounting.wheel_in_imu_m));
+    const Eigen::Vector3d wheel_m_s = OdometerTurn(state) * mounting.vehicle_from_imu *
+                                      (unit_m_s + rate.cross(mounting.wheel_in_imu_m));
     return Reading(Eigen::Vector3d(
         wheel_m_s.y(), wheel_m_s.z(), wheel_m_s.x() / (1.0 + state.odometer_scale)));
   };
@@ -154,7 +164,8 @@ TEST(UpdateColumns, OfTheImageDisplacement) {
                                   kSpan_s * e.segment<3>(FusionLayout::kVelocity);
     const Eigen::Quaterniond world_from_imu =
         first.world_from_imu * ExpRotation(e.segment<3>(FusionLayout::kAttitude));
-    const Eigen::Vector3d in_vehicle_m = vehicle_from_imu * (world_from_imu.conjugate() * way_m);
+    const Eigen::Vector3d in_vehicle_m = ExpRotation({0.0, 0.0, state.image_turn_rad}) *
+                                         vehicle_from_imu * (world_from_imu.conjugate() * way_m);
     return Reading(in_vehicle_m.head<2>() / (1.0 + state.image_scale));
   };
   one.update = [&](FusionFilter& filter, const Reading& reading) {

@@ -101,5 +101,21 @@ TEST(RailStart, WhatMayBeIsNotComplainedOf) {
   }
 }
 
+// One that is built in roughly, and says so, may lie further from the accelerometers.
+TEST(RailStart, AnInclinometerIsHeldAgainstWhatItsMountingAllows) {
+  for (const double sigma_deg : {0.0, 0.5}) {
+    GeneratedRun run = GenerateStraight({.stream = "rail_start_rough", .even_s = 4.0});
+    run.setup.tilt->sigma_rotation_rad = DegToRad(sigma_deg);
+    EachTilt(run, [](TiltAngles& angles) { angles.beta_rad += DegToRad(1.0); });
+    const auto line = SolveRailLine(run.setup, run.recording, RailMethod::kFilter);
+    if (sigma_deg > 0.0) {
+      EXPECT_TRUE(line);
+    } else {
+      ASSERT_FALSE(line);
+      EXPECT_EQ(line.error().fault, RailStartFault::kTiltDisagrees);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tbm
