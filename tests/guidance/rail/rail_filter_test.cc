@@ -11,75 +11,14 @@
 #include "guidance/rail_study/rail_scene.h"
 #include "pose/base/angle.h"
 #include "pose/geometry/rigid3.h"
+#include "tests/guidance/rail/straight_run.h"
 #include "tests/support/random.h"
 
 namespace tbm {
 namespace {
 
+using test::GenerateStraight;
 using test::Random;
-
-// A trolley that runs straight on along the world's x and stops again, by the unit's axes. Nothing
-// but the unit and its inclinometer, and the heading that somebody has given.
-struct StraightRun {
-  RailSetup setup;
-  RailRecording recording;
-  std::vector<RailTruth> truth;
-};
-
-struct StraightScene {
-  double rest_s = 6.0;
-  double run_s = 20.0;  // 0.15 m/s2 for two seconds at either end of it, evenly in between
-  double end_rest_s = 3.0;
-};
-
-StraightRun RunStraight(const StraightScene& scene, Random& random) {
-  constexpr double kRate_hz = 100.0;
-  constexpr double kForce_m_s2 = 0.15;
-  StraightRun run;
-  RailSetup& setup = run.setup;
-  setup.imu.rate_hz = kRate_hz;
-  setup.imu.noise.angle_random_walk_rad = DegToRad(0.1) / 60.0;
-  setup.imu.noise.velocity_random_walk_m_s = 3e-4;
-  setup.imu.gyro_bias_sigma_rad_s = 1e-4;
-  setup.imu.accel_bias_sigma_m_s2 = 5e-3;
-  setup.tilt = TiltMounting{Eigen::Quaterniond::Identity(), DegToRad(0.003)};
-  setup.start.sigma_position_m = 1e-4;
-  setup.start.at_rest_s = scene.rest_s;
-  setup.start.sigma_heading_rad = DegToRad(0.02);
-  const double yaw_rad = random.Normal(setup.start.sigma_heading_rad);
-  setup.start.heading_rad = yaw_rad;
-  const Eigen::Vector3d gyro_bias = random.Normal3(setup.imu.gyro_bias_sigma_rad_s);
-  const Eigen::Vector3d accel_bias = random.Normal3(setup.imu.accel_bias_sigma_m_s2);
-  const double gyro_sigma = setup.imu.noise.angle_random_walk_rad * std::sqrt(kRate_hz);
-  const double accel_sigma = setup.imu.noise.velocity_random_walk_m_s * std::sqrt(kRate_hz);
-  const auto samples = static_cast<int>(kRate_hz * (scene.rest_s + scene.run_s + scene.end_rest_s));
-  double x_m = 0.0;
-  double speed_m_s = 0.0;
-  for (int i = 1; i <= samples; ++i) {
-    const double runs_s = (i - 0.5) / kRate_hz - scene.rest_s;
-    double force = 0.0;
-    if (runs_s > 0.0 && runs_s < 2.0) force = kForce_m_s2;
-    if (runs_s > scene.run_s - 2.0 && runs_s < scene.run_s) force = -kForce_m_s2;
-    x_m += speed_m_s / kRate_hz + 0.5 * force / (kRate_hz * kRate_hz);
-    speed_m_s += force / kRate_hz;
-    const Timestamp at{1'790'000'000'000'000'000 + 10'000'000L * i};
-    ImuSample sample;
-    sample.ends_at = at;
-    sample.interval_s = 1.0 / kRate_hz;
-    sample.gyro_rad_s = gyro_bias + random.Normal3(gyro_sigma);
-    sample.accel_m_s2 =
-        Eigen::Vector3d(force, 0.0, setup.gravity_m_s2) + accel_bias + random.Normal3(accel_sigma);
-    run.recording.imu.push_back(sample);
-    run.truth.push_back({at, {x_m, 0.0, 0.0}, Eigen::Quaterniond::Identity()});
-    if (i % 10 == 0) {
-      run.recording.tilts.push_back(
-          {at,
-           {random.Normal(setup.tilt->sigma_rad) - force / setup.gravity_m_s2,
-            random.Normal(setup.tilt->sigma_rad)}});
-    }
-  }
-  return run;
-}
 
 double Squared(const RailPoint& point, const RailTruth& truth) {
   return (point.position_world_m - truth.position_world_m)
@@ -93,7 +32,12 @@ TEST(RailFilter, WhatIsMovedWhileSamplesAreMissingAtRestIsNoRest) {
   constexpr int kRuns = 12;
   for (int seed = 0; seed < kRuns; ++seed) {
     Random random("moved at rest", static_cast<std::uint64_t>(seed));
-    StraightRun run = RunStraight({.rest_s = 6.0, .run_s = 8.0, .end_rest_s = 12.0}, random);
+    GeneratedRun run = GenerateStraight({.stream = "moved at rest, the run",
+                                         .draw = static_cast<std::uint64_t>(seed),
+                                         .speed_m_s = 0.3,
+                                         .even_s = 4.0,
+                                         .end_rest_s = 12.0,
+                                         .is_push_even = true});
     const Timestamp begin = run.recording.imu.front().ends_at;
     const Eigen::Vector3d moved_m = random.Normal3(0.2);
     std::erase_if(run.recording.imu, [&](const ImuSample& sample) {
@@ -118,8 +62,7 @@ TEST(RailFilter, WhatIsMovedWhileSamplesAreMissingAtRestIsNoRest) {
 }
 
 TEST(RailFilter, ADeclaredRestDoesNotBridgeMissingSamples) {
-  Random random("gap in the declared rest");
-  StraightRun run = RunStraight({}, random);
+  GeneratedRun run = GenerateStraight({.stream = "gap in the declared rest", .speed_m_s = 0.3});
   const Timestamp begin = run.recording.imu.front().ends_at;
   std::erase_if(run.recording.imu, [&](const ImuSample& sample) {
     const double t = SecondsBetween(begin, sample.ends_at);
@@ -134,8 +77,8 @@ TEST(RailFilter, ADeclaredRestDoesNotBridgeMissingSamples) {
 }
 
 TEST(QuietWatch, ASpanEndsWhereSamplesAreMissing) {
-  Random random("quiet across a gap");
-  StraightRun run = RunStraight({.run_s = 8.0, .end_rest_s = 12.0}, random);
+  GeneratedRun run = GenerateStraight(
+      {.stream = "quiet across a gap", .speed_m_s = 0.3, .even_s = 4.0, .end_rest_s = 12.0});
   const Timestamp begin = run.recording.imu.front().ends_at;
   const auto within = [&](Timestamp at, double from_s, double to_s) {
     const double t = SecondsBetween(begin, at);
@@ -212,7 +155,11 @@ AskewTally WithAskewWheel(double askew_sigma_rad, int runs) {
   AskewTally tally;
   for (int seed = 0; seed < runs; ++seed) {
     Random random("askew wheel", static_cast<std::uint64_t>(seed));
-    StraightRun run = RunStraight({.run_s = 40.0}, random);
+    GeneratedRun run = GenerateStraight({.stream = "askew wheel, the run",
+                                         .draw = static_cast<std::uint64_t>(seed),
+                                         .speed_m_s = 0.3,
+                                         .even_s = 36.0,
+                                         .is_push_even = true});
     RailOdometer wheel;
     wheel.sigma_m = 3e-4;
     wheel.sigma_scale = 1e-3;
@@ -263,7 +210,11 @@ TEST(RailFilter, AnInclinometerThatIsBuiltInAskewIsAsGoodAsItSays) {
   constexpr int kRuns = 24;
   for (int seed = 0; seed < kRuns; ++seed) {
     Random random("askew inclinometer", static_cast<std::uint64_t>(seed));
-    StraightRun run = RunStraight({}, random);
+    GeneratedRun run = GenerateStraight({.stream = "askew inclinometer, the run",
+                                         .draw = static_cast<std::uint64_t>(seed),
+                                         .speed_m_s = 0.3,
+                                         .even_s = 16.0,
+                                         .is_push_even = true});
     run.setup.tilt->sigma_rotation_rad = DegToRad(0.05);
     const Eigen::Vector2d off_rad = random.Normal2(run.setup.tilt->sigma_rotation_rad);
     for (TrolleyTilt& tilt : run.recording.tilts) {

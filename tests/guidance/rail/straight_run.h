@@ -23,6 +23,7 @@ struct StraightScene {
   double speed_m_s = 1.0;
   double even_s = 20.0;
   double end_rest_s = 3.0;
+  bool is_push_even = false;      // starts and stops with one force: as quiet as rest
   double cant_deg = 0.0;          // of the rail, all along
   double sway_deg = 0.0;          // how far it yaws, nods and rolls on its way
   double target_spacing_m = 0.0;  // 0: no targets, and the heading is given
@@ -50,6 +51,7 @@ class StraightPath {
     const double u = t - scene_.rest_s;
     const double end_s = 2.0 * kRamp_s + scene_.even_s;
     const double into_s = std::clamp(std::min(u, end_s - u), 0.0, kRamp_s);
+    if (scene_.is_push_even) return scene_.speed_m_s * into_s / kRamp_s;
     return 0.5 * scene_.speed_m_s * (1.0 - std::cos(std::numbers::pi * into_s / kRamp_s));
   }
   Eigen::Vector3d PositionAt(double t) const { return {WayAt(t), 0.0, 0.0}; }
@@ -66,6 +68,7 @@ class StraightPath {
 
   double Ramp(double u) const {
     const double pi = std::numbers::pi;
+    if (scene_.is_push_even) return 0.5 * scene_.speed_m_s * u * u / kRamp_s;
     return 0.5 * scene_.speed_m_s * (u - kRamp_s / pi * std::sin(pi * u / kRamp_s));
   }
 
